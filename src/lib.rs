@@ -1,0 +1,12 @@
+//! Hierarchies of levels of detail (HLOD) for city meshes too large to draw.
+//!
+//! Conventions: metres and seconds unless a name says otherwise (`_ms`, `_bytes`); right-handed
+//! axes, counter-clockwise front faces; input axes are kept and which axis is up is recorded.
+//! Source coordinates are f64 until a block gives them an f64 origin and f32 offsets.
+//! The library neither prints nor exits nor panics on input; only the programs do.
+
+pub mod error;
+pub mod format;
+pub mod mesh;
+
+pub use error::{Error, Result};

@@ -1,0 +1,9 @@
+//! What the build side works on: imported [`Model`]s, [`Material`]s, and the [`Mesh`] of one piece.
+
+mod material;
+mod model;
+mod piece;
+
+pub use material::{AlphaMode, Material, TextureData, TextureSource, Wrap};
+pub use model::{Group, Model, Part, UpAxis, Warnings};
+pub use piece::Mesh;

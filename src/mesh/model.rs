@@ -1,0 +1,109 @@
+//! An input file in memory: f64 positions, faces already triangulated, nothing welded or cut.
+
+use std::path::PathBuf;
+
+use super::{Material, TextureSource};
+
+/// Which input axis points at the sky.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum UpAxis {
+    /// glTF's convention.
+    Y,
+    /// Surveying's convention, and that of most city OBJ files.
+    Z,
+}
+
+/// A named group (`g` or `o` of OBJ, node or mesh of glTF).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Its name in the source; need not be unique.
+    pub name: String,
+}
+
+/// The triangles of one group that share one material.
+///
+/// A vertex is a position with its texture coordinate and colour; a position that is used with
+/// two texture coordinates is two vertices. All indices are valid and all coordinates are finite.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Part {
+    /// Index into [`Model::groups`].
+    pub group: u32,
+    /// Index into [`Model::materials`].
+    pub material: u32,
+    /// Source coordinates in source units and axes, unrounded.
+    pub positions: Vec<[f64; 3]>,
+    /// One per vertex, or empty. v grows downwards (glTF's convention), so OBJ's v is flipped;
+    /// texture transforms are already applied. Not limited to 0–1.
+    pub texcoords: Vec<[f32; 2]>,
+    /// One per vertex, or empty. RGBA, linear light, 65535 is 1.
+    pub colors: Vec<[u16; 4]>,
+    /// Three per triangle, into this part's vertices, counter-clockwise seen from the front.
+    pub indices: Vec<u32>,
+}
+
+/// What was imperfect in an input and how often, in the order in which it was first met.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Warnings {
+    entries: Vec<(String, u64)>,
+}
+
+impl Warnings {
+    /// Counts `times` more of `what`. The text names the file and, where it is one, the element.
+    pub fn add(&mut self, what: impl Into<String>, times: u64) {
+        if times == 0 {
+            return;
+        }
+        let what = what.into();
+        match self.entries.iter_mut().find(|(text, _)| *text == what) {
+            Some((_, count)) => *count += times,
+            None => self.entries.push((what, times)),
+        }
+    }
+
+    /// Takes over all of `other`.
+    pub fn extend(&mut self, other: Warnings) {
+        for (what, times) in other.entries {
+            self.add(what, times);
+        }
+    }
+
+    /// Text and count of each.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, u64)> {
+        self.entries.iter().map(|(what, times)| (what.as_str(), *times))
+    }
+
+    /// True where nothing was imperfect.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+}
+
+/// One input file, imported.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// The file, as given on the command line or found in a folder.
+    pub source: PathBuf,
+    /// Every file that was read for it or that it names (the model itself, MTL, textures, bin),
+    /// sorted and without duplicates; a change in any of them makes the result stale.
+    pub dependencies: Vec<PathBuf>,
+    /// Groups in order of appearance; at least one.
+    pub groups: Vec<Group>,
+    /// Triangles by group and material, in order of appearance; no part is empty.
+    pub parts: Vec<Part>,
+    /// Materials; the index is meaningful, the order is that of the source.
+    pub materials: Vec<Material>,
+    /// Pictures that the materials use.
+    pub textures: Vec<TextureSource>,
+    /// The sky's direction where the format says (glTF: Y); `None` where it does not (OBJ).
+    pub up: Option<UpAxis>,
+    /// What was imperfect.
+    pub warnings: Warnings,
+}
+
+impl Model {
+    /// The number of triangles in all parts.
+    pub fn triangle_count(&self) -> usize {
+        self.parts.iter().map(|part| part.indices.len() / 3).sum()
+    }
+}
