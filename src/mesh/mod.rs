@@ -1,9 +1,11 @@
 //! What the build side works on: imported [`Model`]s, [`Material`]s, and the [`Mesh`] of one piece.
 
+mod coordinate;
 mod material;
 mod model;
 mod piece;
 
+pub use coordinate::{Coordinate, PositionKey, key, wide};
 pub use material::{AlphaMode, Material, TextureData, TextureSource, Wrap};
 pub use model::{Group, Model, Part, UpAxis, Warnings};
 pub use piece::Mesh;

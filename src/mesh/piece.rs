@@ -1,14 +1,17 @@
 //! The working mesh of a piece: a block, a part of one between cutting planes, or a node.
 
-/// An indexed triangle mesh in f32 metres from its block's f64 origin.
+use super::coordinate::{Coordinate, wide};
+
+/// An indexed triangle mesh: f32 metres from its block's f64 origin, or, while a file is divided
+/// into blocks, f64 source coordinates.
 ///
 /// Source and cut vertices lie on the block's lattice (see [`crate::build::lattice`]), so their
 /// f32 offsets are exact. A vertex belongs to one material: where two materials meet there are
 /// two vertices at the same position, as at a texture seam. Arrays are parallel per vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Mesh {
-    /// Metres from the block's origin.
-    pub positions: Vec<[f32; 3]>,
+pub struct Mesh<C = f32> {
+    /// Metres from the block's origin (f32) or source coordinates (f64).
+    pub positions: Vec<[C; 3]>,
     /// One per vertex, or empty where no material of the block is textured. v grows downwards.
     pub texcoords: Vec<[f32; 2]>,
     /// One per vertex, or empty where the block has no vertex colours. RGBA, linear, 65535 is 1.
@@ -19,7 +22,7 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-impl Mesh {
+impl<C: Coordinate> Mesh<C> {
     /// The material of a triangle.
     pub fn triangle_material(&self, triangle: [u32; 3]) -> u32 {
         self.materials[triangle[0] as usize]
@@ -27,6 +30,60 @@ impl Mesh {
 
     /// Corner positions of a triangle, widened to f64.
     pub fn corners(&self, triangle: [u32; 3]) -> [glam::DVec3; 3] {
-        triangle.map(|vertex| glam::Vec3::from(self.positions[vertex as usize]).as_dvec3())
+        triangle.map(|vertex| wide(self.positions[vertex as usize]))
+    }
+}
+
+impl<C: Coordinate> Mesh<C> {
+    /// Appends a copy of a vertex of `other`, which has the same kinds of attributes.
+    pub fn push_vertex_from(&mut self, other: &Self, vertex: usize) -> u32 {
+        let index = self.positions.len() as u32;
+        self.positions.push(other.positions[vertex]);
+        if !other.texcoords.is_empty() {
+            self.texcoords.push(other.texcoords[vertex]);
+        }
+        if !other.colors.is_empty() {
+            self.colors.push(other.colors[vertex]);
+        }
+        self.materials.push(other.materials[vertex]);
+        index
+    }
+
+    /// Bounding box of the vertices, metres from the block's origin; `None` without vertices.
+    pub fn bounds(&self) -> Option<([C; 3], [C; 3])> {
+        let first = *self.positions.first()?;
+        Some(self.positions.iter().fold((first, first), |(low, high), p| {
+            (
+                std::array::from_fn(|i| if p[i] < low[i] { p[i] } else { low[i] }),
+                std::array::from_fn(|i| if p[i] > high[i] { p[i] } else { high[i] }),
+            )
+        }))
+    }
+
+    /// The sum of the areas of all triangles, square metres.
+    pub fn area(&self) -> f64 {
+        self.triangles.iter().map(|&triangle| self.triangle_area(triangle)).sum()
+    }
+
+    /// The area of one triangle, square metres.
+    pub fn triangle_area(&self, triangle: [u32; 3]) -> f64 {
+        let [a, b, c] = self.corners(triangle);
+        (b - a).cross(c - a).length() * 0.5
+    }
+}
+
+impl<C: Coordinate> Mesh<C> {
+    /// Appends a copy of one of its own vertices.
+    pub fn push_copy(&mut self, vertex: usize) -> u32 {
+        let index = self.positions.len() as u32;
+        self.positions.push(self.positions[vertex]);
+        if !self.texcoords.is_empty() {
+            self.texcoords.push(self.texcoords[vertex]);
+        }
+        if !self.colors.is_empty() {
+            self.colors.push(self.colors[vertex]);
+        }
+        self.materials.push(self.materials[vertex]);
+        index
     }
 }

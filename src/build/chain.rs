@@ -1,0 +1,271 @@
+//! The border that a cutting plane makes, as chains of edges, and the ranking of its vertices.
+//!
+//! A chain runs between two vertices that can never go: ends, branches, corners with other
+//! planes, texture seams, and vertices that lie beside the plane rather than on it. Within a
+//! chain the importance of a vertex is the distance at which Douglas and Peucker's recursion
+//! first needs it, so the most important `n` vertices of a plane are a best-effort polyline of
+//! `n` vertices, and no removed vertex is farther from it than the largest removed importance.
+
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+use crate::mesh::{Coordinate, PositionKey, key, wide};
+
+/// One polyline of border edges, ends included; a loop has its first vertex again at its end.
+#[derive(Clone, Debug, Default)]
+pub struct Chain<C = f32> {
+    /// Positions along it.
+    pub positions: Vec<[C; 3]>,
+    /// The coarsest level at which each is kept.
+    pub keep: Vec<u8>,
+}
+
+/// A cutting plane and the border that it made, at full resolution.
+#[derive(Clone, Debug, Default)]
+pub struct CutPlane<C: Coordinate = f32> {
+    /// The axis that the plane is perpendicular to: 0, 1 or 2.
+    pub axis: usize,
+    /// Its coordinate on that axis, metres from the block's origin.
+    pub coordinate: C,
+    /// The border edges as chains.
+    pub chains: Vec<Chain<C>>,
+    /// Where each position stands: chain and index within it.
+    places: FxHashMap<PositionKey<C>, Vec<(u32, u32)>>,
+}
+
+/// A border vertex before ranking.
+#[derive(Clone, Copy, Debug)]
+pub struct BorderVertex<C = f32> {
+    /// Metres from the block's origin.
+    pub position: [C; 3],
+    /// It may not go at any level.
+    pub fixed: bool,
+}
+
+/// How many border vertices each level keeps.
+#[derive(Clone, Debug)]
+pub struct KeepRule {
+    /// For each level from the coarsest node that the plane bounds down to the leaves, the share
+    /// of the border's vertices that is kept, 0–1; the last entry (leaves) is 1.
+    pub shares: Vec<f64>,
+    /// The level of `shares[0]`.
+    pub first_level: u8,
+    /// Vertices closer than this to their chord are kept at the leaves only; metres.
+    pub collinear: f64,
+}
+
+impl<C: Coordinate> CutPlane<C> {
+    /// Joins border edges (pairs of indices into `vertices`, each edge once) into chains and
+    /// ranks their vertices.
+    pub fn new(
+        axis: usize,
+        coordinate: C,
+        vertices: &[BorderVertex<C>],
+        edges: &[[u32; 2]],
+        rule: &KeepRule,
+    ) -> Self {
+        let runs = chains_of(vertices, edges);
+        let mut importance: Vec<(f64, u32, u32)> = Vec::new();
+        let mut chains: Vec<Chain<C>> = Vec::with_capacity(runs.len());
+        for (number, run) in runs.iter().enumerate() {
+            let positions: Vec<[C; 3]> =
+                run.iter().map(|&vertex| vertices[vertex as usize].position).collect();
+            let points: Vec<DVec3> = positions.iter().map(|&p| wide(p)).collect();
+            let keep = vec![rule.first_level; positions.len()];
+            // A loop that keeps fewer than three of its vertices would fold flat.
+            let is_loop = run.len() > 3 && run[0] == run[run.len() - 1];
+            let spared = if is_loop { 3 } else { 0 };
+            for (index, distance) in douglas_peucker(&points).into_iter().skip(spared) {
+                importance.push((distance, number as u32, index as u32));
+            }
+            chains.push(Chain { positions, keep });
+        }
+        importance.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        let total = importance.len() as f64;
+        for (rank, &(distance, chain, index)) in importance.iter().enumerate() {
+            let last = rule.shares.len() - 1;
+            let step = if distance <= rule.collinear {
+                last
+            } else {
+                rule.shares
+                    .iter()
+                    .position(|share| (rank as f64) < (total * share).ceil())
+                    .unwrap_or(last)
+            };
+            chains[chain as usize].keep[index as usize] = rule.first_level + step as u8;
+        }
+        Self::from_chains(axis, coordinate, chains)
+    }
+
+    /// A plane whose chains are ranked already.
+    pub fn from_chains(axis: usize, coordinate: C, chains: Vec<Chain<C>>) -> Self {
+        let mut places: FxHashMap<PositionKey<C>, Vec<(u32, u32)>> = FxHashMap::default();
+        for (number, chain) in chains.iter().enumerate() {
+            for (index, &position) in chain.positions.iter().enumerate() {
+                places.entry(key(position)).or_default().push((number as u32, index as u32));
+            }
+        }
+        Self { axis, coordinate, chains, places }
+    }
+
+    /// The coarsest level at which the border vertex at `position` is kept: the strictest of its
+    /// places. `None` where the position is not on this border.
+    pub fn keep_level(&self, position: [C; 3]) -> Option<u8> {
+        let places = self.places.get(&key(position))?;
+        places.iter().map(|&(chain, at)| self.chains[chain as usize].keep[at as usize]).min()
+    }
+
+    /// The original polyline between two border vertices that are neighbours at `level`, ends
+    /// included: the run whose inner vertices are all gone at that level.
+    pub fn run_between(&self, a: [C; 3], b: [C; 3], level: u8) -> Option<Vec<[C; 3]>> {
+        let from = self.places.get(&key(a))?;
+        let to = self.places.get(&key(b))?;
+        let mut best: Option<Vec<[C; 3]>> = None;
+        for &(chain_a, at_a) in from {
+            for &(chain_b, at_b) in to {
+                if chain_a != chain_b || at_a == at_b {
+                    continue;
+                }
+                let chain = &self.chains[chain_a as usize];
+                let (low, high) = (at_a.min(at_b) as usize, at_a.max(at_b) as usize);
+                let inner_gone = chain.keep[low + 1..high].iter().all(|&keep| keep > level);
+                let shorter = best.as_ref().is_none_or(|best| high - low + 1 < best.len());
+                if inner_gone && shorter {
+                    best = Some(chain.positions[low..=high].to_vec());
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Splits the edge graph into runs of vertex indices between fixed vertices; loops are opened at
+/// their first vertex (in index order) and repeat it at the end.
+fn chains_of<C>(vertices: &[BorderVertex<C>], edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
+    let mut neighbours: Vec<Vec<(u32, u32)>> = vec![Vec::new(); vertices.len()];
+    for (number, &[a, b]) in edges.iter().enumerate() {
+        neighbours[a as usize].push((b, number as u32));
+        neighbours[b as usize].push((a, number as u32));
+    }
+    let ends =
+        |vertex: u32| vertices[vertex as usize].fixed || neighbours[vertex as usize].len() != 2;
+    let mut used = vec![false; edges.len()];
+    let mut runs = Vec::new();
+    let follow = |start: u32, first: (u32, u32), used: &mut Vec<bool>| {
+        let mut run = vec![start];
+        let (mut at, mut edge) = first;
+        loop {
+            used[edge as usize] = true;
+            run.push(at);
+            if ends(at) || at == start {
+                return run;
+            }
+            let next = neighbours[at as usize].iter().find(|(_, number)| !used[*number as usize]);
+            match next {
+                Some(&(to, number)) => (at, edge) = (to, number),
+                None => return run,
+            }
+        }
+    };
+    // Runs that begin at a fixed vertex first, then what is left are loops.
+    for only_ends in [true, false] {
+        for vertex in 0..vertices.len() as u32 {
+            if only_ends && !ends(vertex) {
+                continue;
+            }
+            for place in 0..neighbours[vertex as usize].len() {
+                let first = neighbours[vertex as usize][place];
+                if !used[first.1 as usize] {
+                    runs.push(follow(vertex, first, &mut used));
+                }
+            }
+        }
+    }
+    runs
+}
+
+/// For each inner vertex of a polyline, the distance at which the recursion first needs it, made
+/// monotone: never more than that of the vertex whose choice split its range. For a loop, which
+/// has no chord, the vertex farthest from its start is chosen first, then one on each half.
+fn douglas_peucker(points: &[DVec3]) -> Vec<(usize, f64)> {
+    let mut result = Vec::with_capacity(points.len().saturating_sub(2));
+    let mut stack = vec![(0usize, points.len() - 1, f64::INFINITY)];
+    while let Some((low, high, limit)) = stack.pop() {
+        if high <= low + 1 {
+            continue;
+        }
+        let (a, b) = (points[low], points[high]);
+        let (mut farthest, mut distance) = (low + 1, -1.0);
+        for (index, &point) in points.iter().enumerate().take(high).skip(low + 1) {
+            let here = distance_to_segment(point, a, b);
+            if here > distance {
+                (farthest, distance) = (index, here);
+            }
+        }
+        let importance = distance.min(limit);
+        result.push((farthest, importance));
+        stack.push((low, farthest, importance));
+        stack.push((farthest, high, importance));
+    }
+    result
+}
+
+/// The distance of a point to a segment.
+pub(super) fn distance_to_segment(point: DVec3, a: DVec3, b: DVec3) -> f64 {
+    let along = b - a;
+    let length = along.length_squared();
+    let t = if length > 0.0 { ((point - a).dot(along) / length).clamp(0.0, 1.0) } else { 0.0 };
+    point.distance(a + along * t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn vertices(points: &[[f32; 3]]) -> Vec<BorderVertex> {
+        points.iter().map(|&position| BorderVertex { position, fixed: false }).collect()
+    }
+
+    fn rule(shares: &[f64]) -> KeepRule {
+        KeepRule { shares: shares.to_vec(), first_level: 1, collinear: 1e-6 }
+    }
+
+    #[test]
+    fn collinear_vertices_are_kept_at_the_leaves_only() {
+        let points: Vec<_> = (0..9).map(|i| [0.0, i as f32, 0.0]).collect();
+        let edges: Vec<_> = (0..8).map(|i| [i, i + 1]).collect();
+        let plane = CutPlane::new(0, 0.0, &vertices(&points), &edges, &rule(&[0.5, 0.8, 1.0]));
+        assert_eq!(plane.chains.len(), 1);
+        assert_eq!(plane.keep_level(points[0]), Some(1));
+        assert_eq!(plane.keep_level(points[4]), Some(3));
+        let run = plane.run_between(points[0], points[8], 1).unwrap();
+        assert_eq!(run.len(), 9);
+        assert!(plane.run_between(points[0], points[8], 3).is_none(), "all are kept there");
+    }
+
+    #[test]
+    fn kept_sets_are_nested_and_removed_vertices_lie_near_the_chord() {
+        let points: Vec<_> =
+            (0..200).map(|i| [0.0, i as f32 * 0.1, ((i * 7919) % 13) as f32 * 0.01]).collect();
+        let edges: Vec<_> = (0..199).map(|i| [i, i + 1]).collect();
+        let shares = [0.1, 0.3, 1.0];
+        let plane = CutPlane::new(0, 0.0, &vertices(&points), &edges, &rule(&shares));
+        let count =
+            |level: u8| points.iter().filter(|&&p| plane.keep_level(p).unwrap() <= level).count();
+        assert_eq!(count(1), 2 + 20);
+        assert_eq!(count(2), 2 + 60);
+        assert_eq!(count(3), 200);
+    }
+
+    #[test]
+    fn loops_and_branches_are_covered_edge_by_edge() {
+        // A square loop, and a tail that branches off its first corner.
+        let points =
+            [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]];
+        let edges = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4]];
+        let plane = CutPlane::new(0, 0.0, &vertices(&points), &edges, &rule(&[0.0, 1.0]));
+        let covered: usize = plane.chains.iter().map(|chain| chain.positions.len() - 1).sum();
+        assert_eq!(covered, edges.len());
+        assert_eq!(plane.keep_level(points[0]), Some(1), "the branch is fixed");
+    }
+}

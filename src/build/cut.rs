@@ -1,0 +1,389 @@
+//! Cutting a piece at a plane (thesis section 3.2, figure 3.2): triangles that cross are
+//! re-triangulated at the plane, with the same new vertices on both sides.
+//!
+//! Every vertex is labelled below, above, or on the plane; only edges from below to above are
+//! split. Any labelling gives two pieces that fit together without gap or overlap, since both get
+//! the same vertices; that freedom is used twice:
+//! - A vertex so near the plane that a split edge would leave a sliver counts as on it.
+//! - An edge that lies on an earlier cut is never split, since the neighbour across that cut would
+//!   not know of the new vertex (a T-junction); its end nearer to the plane counts as on it.
+//!
+//! New vertices are computed from the edge's ends in an order that depends on the positions alone
+//! and rounded to the lattice, so they are equal in every bit wherever the edge is met.
+
+use std::sync::Arc;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use super::border::{Border, Path};
+use super::chain::{BorderVertex, CutPlane, KeepRule};
+use super::lattice::Lattice;
+use crate::mesh::{Coordinate, Mesh, PositionKey, key};
+
+/// Limits of the labelling.
+#[derive(Clone, Copy, Debug)]
+pub struct CutTolerance {
+    /// A crossing that would leave less than this share of an edge on one side is not made: the
+    /// edge's end counts as on the plane. 0–0.5.
+    pub sliver_share: f64,
+    /// Nor one nearer to the edge's end than this many lattice steps.
+    pub sliver_steps: f64,
+}
+
+impl Default for CutTolerance {
+    fn default() -> Self {
+        Self { sliver_share: 0.01, sliver_steps: 4.0 }
+    }
+}
+
+/// A piece of a block: its mesh, its borders and the planes that made them.
+#[derive(Clone, Debug, Default)]
+pub struct Piece<C: Coordinate = f32> {
+    /// The geometry.
+    pub mesh: Mesh<C>,
+    /// Which vertices are shared with neighbours.
+    pub border: Border,
+    /// The planes on the way here.
+    pub path: Path<C>,
+}
+
+/// Where and how to cut.
+#[derive(Clone, Debug)]
+pub struct Cut<'a, C> {
+    /// 0, 1 or 2.
+    pub axis: usize,
+    /// Metres from the block's origin; a multiple of the lattice step.
+    pub coordinate: C,
+    /// Where new vertices are rounded to; `None` while a file is divided, in f64.
+    pub lattice: Option<Lattice>,
+    /// See [`CutTolerance`].
+    pub tolerance: CutTolerance,
+    /// How many of the new border's vertices each level keeps.
+    pub rule: &'a KeepRule,
+}
+
+const BELOW: i8 = -1;
+const ON: i8 = 0;
+const ABOVE: i8 = 1;
+
+/// Cuts `piece`; either side may be empty of triangles.
+pub fn cut<C: Coordinate>(piece: Piece<C>, cut: &Cut<C>) -> (Piece<C>, Piece<C>) {
+    let Piece { mut mesh, mut border, path } = piece;
+    let mut labels = label(&mesh, &border, cut);
+    let halves = split(&mut mesh, &mut border, &mut labels, cut);
+    let plane = Arc::new(make_plane(&mesh, &border, &labels, &halves, cut));
+    let path_below = path.with(Arc::clone(&plane));
+    let path_above = path_below.clone();
+    let bit = path.len() as u32;
+    let shared = shared_positions(&mesh, &labels, &halves);
+    let below = extract(&mesh, &border, &halves.below, &labels, &shared, &plane, bit);
+    let above = extract(&mesh, &border, &halves.above, &labels, &shared, &plane, bit);
+    (
+        Piece { mesh: below.0, border: below.1, path: path_below },
+        Piece { mesh: above.0, border: above.1, path: path_above },
+    )
+}
+
+/// Triangles of the two sides, and the edges along which crossing triangles were split.
+struct Halves {
+    below: Vec<[u32; 3]>,
+    above: Vec<[u32; 3]>,
+    split_edges: Vec<[u32; 2]>,
+}
+
+fn label<C: Coordinate>(mesh: &Mesh<C>, border: &Border, cut: &Cut<C>) -> Vec<i8> {
+    let distance =
+        |vertex: u32| mesh.positions[vertex as usize][cut.axis].wide() - cut.coordinate.wide();
+    let mut labels: Vec<i8> = mesh
+        .positions
+        .iter()
+        .map(|position| {
+            if position[cut.axis] < cut.coordinate {
+                BELOW
+            } else if position[cut.axis] > cut.coordinate {
+                ABOVE
+            } else {
+                ON
+            }
+        })
+        .collect();
+    let step = cut.lattice.map_or(0.0, |lattice| lattice.step);
+    let nearest = cut.tolerance.sliver_steps * step;
+    let mut marked: FxHashSet<PositionKey<C>> = FxHashSet::default();
+    let mut widest = 0.0f64;
+    for &[a, b, c] in &mesh.triangles {
+        let corner_labels = [labels[a as usize], labels[b as usize], labels[c as usize]];
+        if !(corner_labels.contains(&BELOW) && corner_labels.contains(&ABOVE)) {
+            continue;
+        }
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            if labels[from as usize] * labels[to as usize] >= 0 {
+                continue;
+            }
+            let (near, far) = {
+                let (from_distance, to_distance) = (distance(from).abs(), distance(to).abs());
+                let from_first = from_distance
+                    .total_cmp(&to_distance)
+                    .then_with(|| order(mesh, from).cmp(&order(mesh, to)))
+                    .is_le();
+                if from_first { (from, to) } else { (to, from) }
+            };
+            let (near_distance, far_distance) = (distance(near).abs(), distance(far).abs());
+            let on_earlier_cut = border.planes[from as usize] & border.planes[to as usize] != 0;
+            let sliver = near_distance
+                <= (cut.tolerance.sliver_share * (near_distance + far_distance)).max(nearest);
+            if on_earlier_cut || sliver {
+                marked.insert(key(mesh.positions[near as usize]));
+                widest = widest.max(near_distance);
+            }
+        }
+    }
+    if !marked.is_empty() {
+        for (vertex, label) in labels.iter_mut().enumerate() {
+            if *label != ON
+                && distance(vertex as u32).abs() <= widest
+                && marked.contains(&key(mesh.positions[vertex]))
+            {
+                *label = ON;
+            }
+        }
+    }
+    labels
+}
+
+/// An order of positions that is the same wherever they are met.
+fn order<C: Coordinate>(mesh: &Mesh<C>, vertex: u32) -> PositionKey<C> {
+    key(mesh.positions[vertex as usize])
+}
+
+fn split<C: Coordinate>(
+    mesh: &mut Mesh<C>,
+    border: &mut Border,
+    labels: &mut Vec<i8>,
+    cut: &Cut<C>,
+) -> Halves {
+    let triangles = std::mem::take(&mut mesh.triangles);
+    let mut halves = Halves {
+        below: Vec::with_capacity(triangles.len() / 2 + 64),
+        above: Vec::with_capacity(triangles.len() / 2 + 64),
+        split_edges: Vec::new(),
+    };
+    let mut made: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+    for triangle in triangles {
+        let side = triangle.map(|vertex| labels[vertex as usize]);
+        let (has_below, has_above) = (side.contains(&BELOW), side.contains(&ABOVE));
+        match (has_below, has_above) {
+            (true, false) => halves.below.push(triangle),
+            (false, true) => halves.above.push(triangle),
+            (false, false) => {
+                let sum: f64 =
+                    triangle.iter().map(|&v| mesh.positions[v as usize][cut.axis].wide()).sum();
+                if sum / 3.0 < cut.coordinate.wide() {
+                    halves.below.push(triangle);
+                } else {
+                    halves.above.push(triangle);
+                }
+            }
+            (true, true) => {
+                let mut crossing = |from: u32, to: u32| {
+                    let edge = (from.min(to), from.max(to));
+                    *made.entry(edge).or_insert_with(|| {
+                        labels.push(ON);
+                        border.planes.push(0);
+                        border.keep.push(0);
+                        push_crossing(mesh, from, to, cut)
+                    })
+                };
+                split_triangle(triangle, side, &mut crossing, &mut halves);
+            }
+        }
+    }
+    // Diagonals of the four-sided parts were chosen by index; nothing else depends on it.
+    halves
+}
+
+/// Splits one triangle that has vertices on both sides.
+fn split_triangle(
+    triangle: [u32; 3],
+    side: [i8; 3],
+    crossing: &mut impl FnMut(u32, u32) -> u32,
+    halves: &mut Halves,
+) {
+    // Turn the triangle so that its first vertex is on the plane or alone on its side.
+    let first = (0..3)
+        .find(|&i| side[i] == ON)
+        .or_else(|| (0..3).find(|&i| side[i] != side[(i + 1) % 3] && side[i] != side[(i + 2) % 3]))
+        .unwrap_or(0);
+    let [a, b, c] = [triangle[first], triangle[(first + 1) % 3], triangle[(first + 2) % 3]];
+    let [side_a, side_b] = [side[first], side[(first + 1) % 3]];
+    if side_a == ON {
+        let middle = crossing(b, c);
+        let (with_b, with_c) = if side_b == BELOW {
+            (&mut halves.below, &mut halves.above)
+        } else {
+            (&mut halves.above, &mut halves.below)
+        };
+        with_b.push([a, b, middle]);
+        with_c.push([a, middle, c]);
+        halves.split_edges.push([a, middle]);
+    } else {
+        let (to_b, to_c) = (crossing(a, b), crossing(a, c));
+        let (alone, pair) = if side_a == BELOW {
+            (&mut halves.below, &mut halves.above)
+        } else {
+            (&mut halves.above, &mut halves.below)
+        };
+        alone.push([a, to_b, to_c]);
+        pair.push([to_b, b, c]);
+        pair.push([to_b, c, to_c]);
+        halves.split_edges.push([to_b, to_c]);
+    }
+}
+
+/// Appends the vertex at which an edge crosses the plane.
+fn push_crossing<C: Coordinate>(mesh: &mut Mesh<C>, from: u32, to: u32, cut: &Cut<C>) -> u32 {
+    let (low, high) = if order(mesh, from) <= order(mesh, to) { (from, to) } else { (to, from) };
+    let (low, high) = (low as usize, high as usize);
+    let start = mesh.positions[low].map(C::wide);
+    let end = mesh.positions[high].map(C::wide);
+    let t = (cut.coordinate.wide() - start[cut.axis]) / (end[cut.axis] - start[cut.axis]);
+    let index = mesh.positions.len() as u32;
+    mesh.positions.push(std::array::from_fn(|i| {
+        if i == cut.axis {
+            cut.coordinate
+        } else {
+            let exact = start[i] + (end[i] - start[i]) * t;
+            // Adding 0 turns -0 into 0.
+            C::narrow(cut.lattice.map_or(exact, |lattice| lattice.round(exact)) + 0.0)
+        }
+    }));
+    if !mesh.texcoords.is_empty() {
+        let (start, end) = (mesh.texcoords[low], mesh.texcoords[high]);
+        mesh.texcoords.push(std::array::from_fn(|i| {
+            (f64::from(start[i]) + (f64::from(end[i]) - f64::from(start[i])) * t) as f32
+        }));
+    }
+    if !mesh.colors.is_empty() {
+        let (start, end) = (mesh.colors[low], mesh.colors[high]);
+        mesh.colors.push(std::array::from_fn(|i| {
+            (f64::from(start[i]) + (f64::from(end[i]) - f64::from(start[i])) * t).round() as u16
+        }));
+    }
+    mesh.materials.push(mesh.materials[low]);
+    index
+}
+
+/// Positions on the plane that triangles of both sides use.
+fn shared_positions<C: Coordinate>(
+    mesh: &Mesh<C>,
+    labels: &[i8],
+    halves: &Halves,
+) -> FxHashSet<PositionKey<C>> {
+    let on_plane = |triangles: &[[u32; 3]]| {
+        let mut used: FxHashSet<PositionKey<C>> = FxHashSet::default();
+        for triangle in triangles {
+            for &vertex in triangle {
+                if labels[vertex as usize] == ON {
+                    used.insert(key(mesh.positions[vertex as usize]));
+                }
+            }
+        }
+        used
+    };
+    let below = on_plane(&halves.below);
+    let mut shared = on_plane(&halves.above);
+    shared.retain(|position| below.contains(position));
+    shared
+}
+
+/// Collects the edges along which the two sides meet and ranks their vertices.
+fn make_plane<C: Coordinate>(
+    mesh: &Mesh<C>,
+    border: &Border,
+    labels: &[i8],
+    halves: &Halves,
+    cut: &Cut<C>,
+) -> CutPlane<C> {
+    let mut numbers: FxHashMap<PositionKey<C>, u32> = FxHashMap::default();
+    let mut vertices: Vec<BorderVertex<C>> = Vec::new();
+    let mut wedges: Vec<u32> = Vec::new();
+    let mut number_of = |vertex: u32| {
+        let position = mesh.positions[vertex as usize];
+        let number = *numbers.entry(key(position)).or_insert_with(|| {
+            vertices.push(BorderVertex { position, fixed: false });
+            wedges.push(vertex);
+            vertices.len() as u32 - 1
+        });
+        let entry = &mut vertices[number as usize];
+        // Beside the plane, on another border too, or on a seam of texture or material.
+        entry.fixed |= position[cut.axis] != cut.coordinate
+            || border.planes[vertex as usize] != 0
+            || wedges[number as usize] != vertex;
+        number
+    };
+    const BOTH: u8 = 3;
+    let mut sides: FxHashMap<[u32; 2], u8> = FxHashMap::default();
+    for &[a, b] in &halves.split_edges {
+        let (a, b) = (number_of(a), number_of(b));
+        sides.insert([a.min(b), a.max(b)], BOTH);
+    }
+    for (triangles, side) in [(&halves.below, 1u8), (&halves.above, 2u8)] {
+        for &[a, b, c] in triangles.iter() {
+            let on = [a, b, c].map(|vertex| labels[vertex as usize] == ON);
+            for (from, to, both) in
+                [(a, b, on[0] && on[1]), (b, c, on[1] && on[2]), (c, a, on[2] && on[0])]
+            {
+                if both {
+                    let (from, to) = (number_of(from), number_of(to));
+                    if from != to {
+                        *sides.entry([from.min(to), from.max(to)]).or_insert(0) |= side;
+                    }
+                }
+            }
+        }
+    }
+    let mut edges: Vec<[u32; 2]> =
+        sides.iter().filter(|&(_, &side)| side == BOTH).map(|(&edge, _)| edge).collect();
+    edges.sort_unstable();
+    CutPlane::new(cut.axis, cut.coordinate, &vertices, &edges, cut.rule)
+}
+
+/// One side as a mesh of its own.
+fn extract<C: Coordinate>(
+    mesh: &Mesh<C>,
+    border: &Border,
+    triangles: &[[u32; 3]],
+    labels: &[i8],
+    shared: &FxHashSet<PositionKey<C>>,
+    plane: &CutPlane<C>,
+    bit: u32,
+) -> (Mesh<C>, Border) {
+    const UNUSED: u32 = u32::MAX;
+    let mut new_index = vec![UNUSED; mesh.positions.len()];
+    let mut side = Mesh::<C>::default();
+    let mut side_border = Border::default();
+    side.triangles.reserve_exact(triangles.len());
+    for &triangle in triangles {
+        let corners = triangle.map(|vertex| {
+            let old = vertex as usize;
+            if new_index[old] == UNUSED {
+                new_index[old] = side.push_vertex_from(mesh, old);
+                let mut planes = border.planes[old];
+                let mut keep = border.keep[old];
+                let position = mesh.positions[old];
+                if labels[old] == ON && shared.contains(&key(position)) {
+                    if planes == 0 {
+                        // A vertex that touches the other side without an edge stays for ever.
+                        keep = plane.keep_level(position).unwrap_or(0);
+                    }
+                    planes |= 1 << bit;
+                }
+                side_border.planes.push(planes);
+                side_border.keep.push(keep);
+            }
+            new_index[old]
+        });
+        side.triangles.push(corners);
+    }
+    (side, side_border)
+}

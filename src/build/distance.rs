@@ -1,0 +1,242 @@
+//! The distance between a mesh and its simplification, measured, both ways.
+//!
+//! The Hausdorff distance obeys the triangle inequality, so the distances between a node and its
+//! children's meshes, summed down to the leaves, bound the distance to the original. It is
+//! sampled at the vertices of both meshes and the centres of the simplified triangles; what the
+//! samples may miss is covered by [`SAMPLING_ALLOWANCE`].
+
+use glam::Vec3;
+
+use crate::mesh::Mesh;
+
+/// The measured distance is multiplied by this, since the farthest point of a surface need not be
+/// one of the samples.
+pub const SAMPLING_ALLOWANCE: f64 = 1.25;
+
+/// The two-sided distance between two meshes over the same surface, metres.
+pub fn hausdorff(source: &Mesh, simplified: &Mesh) -> f64 {
+    if source.triangles.is_empty() || simplified.triangles.is_empty() {
+        return 0.0;
+    }
+    let to_simplified = TriangleGrid::new(simplified);
+    let mut worst = 0f32;
+    for &position in &source.positions {
+        worst = worst.max(to_simplified.distance_beyond(position.into(), worst));
+    }
+    let to_source = TriangleGrid::new(source);
+    for &position in &simplified.positions {
+        worst = worst.max(to_source.distance_beyond(position.into(), worst));
+    }
+    for &triangle in &simplified.triangles {
+        let [a, b, c] = triangle.map(|v| Vec3::from(simplified.positions[v as usize]));
+        worst = worst.max(to_source.distance_beyond((a + b + c) / 3.0, worst));
+    }
+    f64::from(worst) * SAMPLING_ALLOWANCE
+}
+
+/// Triangles in a uniform grid over their bounding box.
+struct TriangleGrid<'a> {
+    mesh: &'a Mesh,
+    low: Vec3,
+    per_cell: f32,
+    cells: [i32; 3],
+    /// Where each cell's triangles begin in `members`.
+    first: Vec<u32>,
+    members: Vec<u32>,
+}
+
+/// Cells for each triangle: more makes the search cheaper and the grid dearer.
+const CELLS_PER_TRIANGLE: f32 = 2.0;
+
+impl<'a> TriangleGrid<'a> {
+    fn new(mesh: &'a Mesh) -> Self {
+        let (low, high) = mesh.bounds().unwrap_or_default();
+        let (low, high) = (Vec3::from(low), Vec3::from(high));
+        let size = (high - low).max(Vec3::splat((high - low).max_element() * 1e-3 + 1e-20));
+        let wanted = (mesh.triangles.len() as f32 * CELLS_PER_TRIANGLE).max(1.0);
+        let side = (size.x * size.y * size.z / wanted).cbrt().max(size.max_element() / 256.0);
+        let cells: [i32; 3] = (size / side).to_array().map(|n| (n.ceil() as i32).clamp(1, 256));
+        let mut grid =
+            Self { mesh, low, per_cell: 1.0 / side, cells, first: Vec::new(), members: Vec::new() };
+        let count = (cells[0] * cells[1] * cells[2]) as usize;
+        let mut first = vec![0u32; count + 1];
+        for &triangle in &mesh.triangles {
+            grid.for_cells_of(triangle, |cell| first[cell + 1] += 1);
+        }
+        for cell in 0..count {
+            first[cell + 1] += first[cell];
+        }
+        let mut fill = first.clone();
+        let mut members = vec![0u32; first[count] as usize];
+        for (number, &triangle) in mesh.triangles.iter().enumerate() {
+            grid.for_cells_of(triangle, |cell| {
+                members[fill[cell] as usize] = number as u32;
+                fill[cell] += 1;
+            });
+        }
+        grid.first = first;
+        grid.members = members;
+        grid
+    }
+
+    fn cell_at(&self, point: Vec3) -> [i32; 3] {
+        let at = ((point - self.low) * self.per_cell).to_array();
+        std::array::from_fn(|i| (at[i] as i32).clamp(0, self.cells[i] - 1))
+    }
+
+    fn for_cells_of(&self, triangle: [u32; 3], mut visit: impl FnMut(usize)) {
+        let [a, b, c] = triangle.map(|v| Vec3::from(self.mesh.positions[v as usize]));
+        let (from, to) = (self.cell_at(a.min(b).min(c)), self.cell_at(a.max(b).max(c)));
+        for z in from[2]..=to[2] {
+            for y in from[1]..=to[1] {
+                for x in from[0]..=to[0] {
+                    visit(self.index([x, y, z]));
+                }
+            }
+        }
+    }
+
+    fn index(&self, [x, y, z]: [i32; 3]) -> usize {
+        ((z * self.cells[1] + y) * self.cells[0] + x) as usize
+    }
+
+    /// The distance from `point` to the nearest triangle; any number not above `enough` where it
+    /// is known not to exceed that.
+    fn distance_beyond(&self, point: Vec3, enough: f32) -> f32 {
+        let home = self.cell_at(point);
+        let side = 1.0 / self.per_cell;
+        // The point may lie outside of the grid.
+        let outside = {
+            let high = self.low
+                + Vec3::new(self.cells[0] as f32, self.cells[1] as f32, self.cells[2] as f32)
+                    * side;
+            point.distance(point.clamp(self.low, high))
+        };
+        let enough_squared = enough * enough;
+        let mut best = f32::INFINITY;
+        let rings = self.cells[0].max(self.cells[1]).max(self.cells[2]);
+        for ring in 0..=rings {
+            // Nothing in this ring or beyond is nearer than this.
+            let reach = (ring as f32 - 1.0) * side;
+            if best <= enough_squared || (reach > 0.0 && best <= reach.max(outside).powi(2)) {
+                break;
+            }
+            self.for_ring(home, ring, |cell| {
+                let range = self.first[cell] as usize..self.first[cell + 1] as usize;
+                for &number in &self.members[range] {
+                    let triangle = self.mesh.triangles[number as usize];
+                    let [a, b, c] = triangle.map(|v| Vec3::from(self.mesh.positions[v as usize]));
+                    best = best.min(squared_distance(point, a, b, c));
+                }
+            });
+        }
+        best.sqrt()
+    }
+
+    /// Visits the cells whose largest index distance from `home` is `ring`.
+    fn for_ring(&self, home: [i32; 3], ring: i32, mut visit: impl FnMut(usize)) {
+        let range = |i: usize| (home[i] - ring).max(0)..=(home[i] + ring).min(self.cells[i] - 1);
+        for z in range(2) {
+            for y in range(1) {
+                let shell = (z - home[2]).abs() == ring || (y - home[1]).abs() == ring;
+                if shell {
+                    for x in range(0) {
+                        visit(self.index([x, y, z]));
+                    }
+                } else {
+                    for x in [home[0] - ring, home[0] + ring] {
+                        if (0..self.cells[0]).contains(&x) {
+                            visit(self.index([x, y, z]));
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Squared distance from a point to a triangle, by the region of the plane that its projection
+/// falls in (Ericson, Real-Time Collision Detection, section 5.1.5).
+fn squared_distance(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> f32 {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return ap.length_squared();
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return bp.length_squared();
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return (ap - ab * (d1 / (d1 - d3))).length_squared();
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return cp.length_squared();
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return (ap - ac * (d2 / (d2 - d6))).length_squared();
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return (bp - (c - b) * t).length_squared();
+    }
+    let normal = ab.cross(ac);
+    let length = normal.length_squared();
+    if length > 0.0 { ap.dot(normal).powi(2) / length } else { ap.length_squared() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Mesh {
+        Mesh {
+            positions: positions.to_vec(),
+            materials: vec![0; positions.len()],
+            triangles: triangles.to_vec(),
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn equal_meshes_are_at_no_distance_and_a_lifted_one_at_its_lift() {
+        let square = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0], [0.0, 4.0, 0.0]];
+        let flat = mesh(&square, &[[0, 1, 2], [0, 2, 3]]);
+        let lifted = mesh(&square.map(|[x, y, _]| [x, y, 0.5]), &[[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(hausdorff(&flat, &flat), 0.0);
+        let distance = hausdorff(&flat, &lifted) / SAMPLING_ALLOWANCE;
+        assert!((distance - 0.5).abs() < 1e-6, "{distance}");
+    }
+
+    #[test]
+    fn agrees_with_trying_every_triangle() {
+        let mut state = 7u32;
+        let mut random = || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let positions: Vec<[f32; 3]> =
+            (0..300).map(|_| [random(), random() * 5.0, random()]).collect();
+        let triangles: Vec<[u32; 3]> = (0..100).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let soup = mesh(&positions, &triangles);
+        let grid = TriangleGrid::new(&soup);
+        for _ in 0..500 {
+            let p = Vec3::new(random() * 3.0 - 1.0, random() * 7.0 - 1.0, random() * 3.0 - 1.0);
+            let naive = triangles
+                .iter()
+                .map(|t| {
+                    let [a, b, c] = t.map(|v| Vec3::from(positions[v as usize]));
+                    squared_distance(p, a, b, c)
+                })
+                .fold(f32::INFINITY, f32::min)
+                .sqrt();
+            assert_eq!(grid.distance_beyond(p, 0.0), naive);
+        }
+    }
+}

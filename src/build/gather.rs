@@ -1,0 +1,179 @@
+//! Gathering a block's geometry from the parts of a model: welded, in f64, then on its lattice.
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use super::blocks::Division;
+use super::border::{Border, Path};
+use super::chain::{Chain, CutPlane, KeepRule};
+use super::cut::{Cut, CutTolerance, Piece, cut};
+use super::lattice::Lattice;
+use crate::mesh::{Mesh, Model, PositionKey, key};
+
+/// What makes two source vertices one.
+type VertexKey = (PositionKey<f64>, [u32; 2], [u16; 4], u32);
+
+/// Joins parts into one piece; vertices that are equal in position, texture coordinate, colour
+/// and material become one.
+pub fn gather(model: &Model, parts: &[usize]) -> Piece<f64> {
+    let textured = |part: usize| {
+        let part = &model.parts[part];
+        model.materials[part.material as usize].texture.is_some() && !part.texcoords.is_empty()
+    };
+    let any_textured = parts.iter().any(|&part| textured(part));
+    let any_colored = parts.iter().any(|&part| !model.parts[part].colors.is_empty());
+    let mut mesh = Mesh::<f64>::default();
+    let total: usize = parts.iter().map(|&part| model.parts[part].indices.len() / 3).sum();
+    mesh.triangles.reserve_exact(total);
+    let mut welded: FxHashMap<VertexKey, u32> = FxHashMap::default();
+    welded.reserve(total / 2);
+    let mut new_index: Vec<u32> = Vec::new();
+    for &number in parts {
+        let part = &model.parts[number];
+        let has_texcoords = textured(number);
+        new_index.clear();
+        new_index.extend((0..part.positions.len()).map(|vertex| {
+            let position = part.positions[vertex].map(|coordinate| coordinate + 0.0);
+            let texcoord = if has_texcoords { part.texcoords[vertex] } else { [0.0; 2] };
+            let color = part.colors.get(vertex).copied().unwrap_or([u16::MAX; 4]);
+            let same = (key(position), texcoord.map(|c| (c + 0.0).to_bits()), color, part.material);
+            *welded.entry(same).or_insert_with(|| {
+                mesh.positions.push(position);
+                if any_textured {
+                    mesh.texcoords.push(texcoord);
+                }
+                if any_colored {
+                    mesh.colors.push(color);
+                }
+                mesh.materials.push(part.material);
+                mesh.positions.len() as u32 - 1
+            })
+        }));
+        for corners in part.indices.as_chunks::<3>().0 {
+            mesh.triangles.push(corners.map(|vertex| new_index[vertex as usize]));
+        }
+    }
+    let border = Border::interior(mesh.positions.len());
+    Piece { mesh, border, path: Path::default() }
+}
+
+/// Cuts a gathered piece into the blocks of a [`Division`], in a fixed order.
+pub fn divide(piece: Piece<f64>, division: Division, shares: &[f64]) -> Vec<Piece<f64>> {
+    let rule = KeepRule { shares: shares.to_vec(), first_level: 0, collinear: 0.0 };
+    match division {
+        Division::Whole => vec![piece],
+        Division::Halves { most } => {
+            let mut done = Vec::new();
+            let mut stack = vec![piece];
+            while let Some(piece) = stack.pop() {
+                let triangles = piece.mesh.triangles.len();
+                let Some((low, high)) = piece.mesh.bounds().filter(|_| triangles > most) else {
+                    done.push(piece);
+                    continue;
+                };
+                let side = |axis: usize| high[axis] - low[axis];
+                let axis =
+                    (1..3).fold(0, |best, axis| if side(axis) > side(best) { axis } else { best });
+                let middle = median_of_triangles(&piece.mesh, axis);
+                if !(middle > low[axis] && middle < high[axis]) || piece.path.len() >= 12 {
+                    done.push(piece);
+                    continue;
+                }
+                let (below, above) = cut_at(piece, axis, middle, &rule);
+                stack.extend([above, below].into_iter().filter(|p| !p.mesh.triangles.is_empty()));
+            }
+            done
+        }
+        Division::Grid { metres, axes } => {
+            let mut done = Vec::new();
+            let mut stack = vec![piece];
+            while let Some(piece) = stack.pop() {
+                match grid_line(&piece.mesh, metres, axes).filter(|_| piece.path.len() < 40) {
+                    None => done.push(piece),
+                    Some((axis, line)) => {
+                        let (below, above) = cut_at(piece, axis, line, &rule);
+                        if below.mesh.triangles.is_empty() || above.mesh.triangles.is_empty() {
+                            // Everything was on one side but for a vertex within tolerance.
+                            done.extend(
+                                [below, above].into_iter().filter(|p| !p.mesh.triangles.is_empty()),
+                            );
+                        } else {
+                            stack.extend([above, below]);
+                        }
+                    }
+                }
+            }
+            done
+        }
+    }
+}
+
+fn cut_at(piece: Piece<f64>, axis: usize, at: f64, rule: &KeepRule) -> (Piece<f64>, Piece<f64>) {
+    let tolerance = CutTolerance::default();
+    cut(piece, &Cut { axis, coordinate: at, lattice: None, tolerance, rule })
+}
+
+/// The coordinate that halves the triangles by their centres.
+fn median_of_triangles(mesh: &Mesh<f64>, axis: usize) -> f64 {
+    let mut centres: Vec<f64> = mesh
+        .triangles
+        .iter()
+        .map(|t| t.iter().map(|&v| mesh.positions[v as usize][axis]).sum::<f64>() / 3.0)
+        .collect();
+    let middle = centres.len() / 2;
+    *centres.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The grid line nearest to the middle of the longer of the two sides that spans several squares.
+/// What reaches less than a hundredth of a square beyond a line counts as within it.
+fn grid_line(mesh: &Mesh<f64>, metres: f64, axes: [usize; 2]) -> Option<(usize, f64)> {
+    let (low, high) = mesh.bounds()?;
+    let slack = metres * 0.01;
+    let squares = |axis: usize| {
+        let first = ((low[axis] + slack) / metres).floor();
+        let last = ((high[axis] - slack) / metres).ceil();
+        (first, (last - first).max(1.0))
+    };
+    let axis = if squares(axes[0]).1 >= squares(axes[1]).1 { axes[0] } else { axes[1] };
+    let (first, count) = squares(axis);
+    (count > 1.0).then(|| (axis, (first + (count / 2.0).floor()) * metres))
+}
+
+/// Brings a piece to its block's origin and lattice; triangles that collapse on the lattice are
+/// dropped and counted.
+pub fn localise(piece: &Piece<f64>, origin: [f64; 3], lattice: Lattice) -> (Piece, u64) {
+    let local = |position: [f64; 3]| -> [f32; 3] {
+        std::array::from_fn(|i| lattice.offset(position[i], origin[i]) + 0.0)
+    };
+    let mesh = Mesh {
+        positions: piece.mesh.positions.iter().map(|&position| local(position)).collect(),
+        texcoords: piece.mesh.texcoords.clone(),
+        colors: piece.mesh.colors.clone(),
+        materials: piece.mesh.materials.clone(),
+        triangles: piece.mesh.triangles.clone(),
+    };
+    let mut mesh = mesh;
+    let before = mesh.triangles.len();
+    let positions = &mesh.positions;
+    mesh.triangles.retain(|&[a, b, c]| {
+        let [a, b, c] = [a, b, c].map(|vertex| positions[vertex as usize]);
+        a != b && b != c && c != a
+    });
+    let dropped = (before - mesh.triangles.len()) as u64;
+    let mut path = Path::default();
+    for bit in 0..piece.path.len() as u32 {
+        let plane = piece.path.plane(bit);
+        let chains = plane
+            .chains
+            .iter()
+            .map(|chain| Chain {
+                positions: chain.positions.iter().map(|&position| local(position)).collect(),
+                keep: chain.keep.clone(),
+            })
+            .collect();
+        let coordinate = lattice.offset(plane.coordinate, origin[plane.axis]);
+        path = path.with(Arc::new(CutPlane::from_chains(plane.axis, coordinate, chains)));
+    }
+    (Piece { mesh, border: piece.border.clone(), path }, dropped)
+}

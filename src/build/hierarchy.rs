@@ -1,0 +1,340 @@
+//! The tree of one block (thesis section 3.2): divide, simplify, recurse.
+//!
+//! With `N` triangles in the block, `simplification_0 = N / desired_tris` and
+//! `simplification_{d+1} = simplification_d / level_factor`; a node at level `d` has its piece's
+//! triangles divided by `simplification_d`. The first level whose factor is at most 1 holds the
+//! original pieces: the leaves. Work is parallel over children and, where a node is simplified
+//! from the original, between its simplification and its division (Cozzi & Loo, section 5.3).
+
+use rayon::prelude::*;
+
+use super::border::{Border, Path};
+use super::chain::KeepRule;
+use super::cut::{Cut, CutTolerance, Piece, cut};
+use super::lattice::Lattice;
+use super::merge::merge;
+use super::simplify::{AppearanceWeights, LadderStep, Simplified, Simplifier, simplify};
+use super::skirt::{Skirt, TRIANGLES_PER_SKIRT, skirts};
+use super::thin_border::thin_border;
+use crate::Result;
+use crate::mesh::Mesh;
+
+/// What a coarse node is simplified from.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum SimplifyFrom {
+    /// The original triangles of its piece, as the thesis does it.
+    Original,
+    /// Its children's results: every triangle is touched about once, not once a level.
+    #[default]
+    Children,
+}
+
+/// What happens to vertices on cutting planes.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum BorderMode {
+    /// None is ever removed: no gaps, and a large part of every coarse node's budget.
+    Locked,
+    /// Thinned alike on both sides; gaps between different levels stay open.
+    Shared,
+    /// Thinned alike on both sides, and the gaps between different levels closed by skirts.
+    #[default]
+    Skirts,
+}
+
+/// A node may not be simplified to fewer triangles than this: a piece must not vanish.
+pub const LEAST_TRIANGLES: usize = 8;
+
+/// How one block is built.
+#[derive(Clone, Debug)]
+pub struct HierarchyOptions {
+    /// Desired triangles of a node (`c_desiredTris`), at least 1.
+    pub desired_tris: u32,
+    /// Ratio of triangles and texels between levels (`c_levelFactor`), at least 2.
+    pub level_factor: u32,
+    /// See [`SimplifyFrom`].
+    pub simplify_from: SimplifyFrom,
+    /// See [`Simplifier`].
+    pub simplifier: Simplifier,
+    /// See [`BorderMode`].
+    pub borders: BorderMode,
+    /// See [`AppearanceWeights`].
+    pub weights: AppearanceWeights,
+    /// See [`CutTolerance`].
+    pub tolerance: CutTolerance,
+}
+
+impl Default for HierarchyOptions {
+    fn default() -> Self {
+        Self {
+            desired_tris: 900,
+            level_factor: 4,
+            simplify_from: SimplifyFrom::default(),
+            simplifier: Simplifier::default(),
+            borders: BorderMode::default(),
+            weights: AppearanceWeights::default(),
+            tolerance: CutTolerance::default(),
+        }
+    }
+}
+
+/// The simplification factors of a block's levels, coarsest first; the last is the leaves' and
+/// is 1.
+pub fn simplifications(triangles: usize, options: &HierarchyOptions) -> Vec<f64> {
+    let mut factors = Vec::new();
+    let mut factor = triangles as f64 / f64::from(options.desired_tris);
+    while factor > 1.0 {
+        factors.push(factor);
+        factor /= f64::from(options.level_factor);
+    }
+    factors.push(1.0);
+    factors
+}
+
+/// A finished node, on its way to disk.
+#[derive(Debug)]
+pub struct NodeDraft<'a> {
+    /// Geometry with source texture coordinates, without skirts.
+    pub mesh: &'a Mesh,
+    /// What closes its borders.
+    pub skirts: &'a [Skirt],
+    /// 0 is the block's root.
+    pub level: usize,
+    /// Child numbers from the root down; empty for the root.
+    pub place: &'a [u32],
+    /// The triangles that it may have.
+    pub budget: usize,
+    /// Distance from the original, metres; 0 for leaves.
+    pub geometric_error: f64,
+    /// How it was made.
+    pub step: LadderStep,
+}
+
+/// Takes finished nodes, from many threads at once.
+pub trait NodeSink: Sync {
+    /// What is kept of a node once it is written.
+    type Record: Send;
+
+    /// Writes a node.
+    fn take(&self, node: &NodeDraft) -> Result<Self::Record>;
+
+    /// Called when pieces holding this many source triangles have become leaves.
+    fn leaves_done(&self, _triangles: usize) {}
+}
+
+/// A node's record and its children.
+#[derive(Debug)]
+pub struct Tree<R> {
+    /// Of the node itself.
+    pub record: R,
+    /// In the order of their place along the cut axis.
+    pub children: Vec<Tree<R>>,
+}
+
+/// One block being built.
+pub struct BlockBuilder<'a, S> {
+    /// How.
+    pub options: &'a HierarchyOptions,
+    /// From [`simplifications`].
+    pub factors: Vec<f64>,
+    /// The block's lattice.
+    pub lattice: Lattice,
+    /// Where nodes go.
+    pub sink: &'a S,
+}
+
+/// A node's geometry as its parent needs it.
+struct Carried {
+    mesh: Mesh,
+    border: Border,
+    error: f64,
+}
+
+impl<S: NodeSink> BlockBuilder<'_, S> {
+    /// Builds the whole tree over a block.
+    pub fn build(&self, block: Piece) -> Result<Tree<S::Record>> {
+        Ok(self.subtree(block, 0, &[])?.0)
+    }
+
+    fn leaf_level(&self) -> usize {
+        self.factors.len() - 1
+    }
+
+    fn subtree(
+        &self,
+        piece: Piece,
+        level: usize,
+        place: &[u32],
+    ) -> Result<(Tree<S::Record>, Option<Carried>)> {
+        if level == self.leaf_level() {
+            let triangles = piece.mesh.triangles.len();
+            let record = self.sink.take(&NodeDraft {
+                mesh: &piece.mesh,
+                skirts: &[],
+                level,
+                place,
+                budget: triangles,
+                geometric_error: 0.0,
+                step: LadderStep::Original,
+            })?;
+            self.sink.leaves_done(triangles);
+            return Ok((Tree { record, children: Vec::new() }, None));
+        }
+        let triangles = piece.mesh.triangles.len();
+        let budget = ((triangles as f64 / self.factors[level]).round() as usize)
+            .max(LEAST_TRIANGLES.min(triangles));
+        let path = piece.path.clone();
+        let from_original =
+            self.options.simplify_from == SimplifyFrom::Original || level + 1 == self.leaf_level();
+        let (carried, record, children) = if from_original {
+            let source =
+                Carried { mesh: piece.mesh.clone(), border: piece.border.clone(), error: 0.0 };
+            let (node, children) = rayon::join(
+                || self.coarse_node(source, &path, level, place, budget),
+                || self.children(piece, level, place),
+            );
+            let ((record, carried), children) = (node?, children?);
+            (carried, record, children.into_iter().map(|(tree, _)| tree).collect())
+        } else {
+            let children = self.children(piece, level, place)?;
+            let (trees, parts): (Vec<_>, Vec<_>) = children.into_iter().unzip();
+            let parts: Vec<Carried> = parts.into_iter().flatten().collect();
+            let pairs: Vec<(&Mesh, &Border)> =
+                parts.iter().map(|part| (&part.mesh, &part.border)).collect();
+            let (mesh, border) = merge(&pairs, path.len());
+            let error = parts.iter().map(|part| part.error).fold(0.0, f64::max);
+            drop(parts);
+            let source = Carried { mesh, border, error };
+            let (record, carried) = self.coarse_node(source, &path, level, place, budget)?;
+            (carried, record, trees)
+        };
+        Ok((Tree { record, children }, Some(carried)))
+    }
+
+    /// Divides a piece and builds what comes of it.
+    fn children(
+        &self,
+        piece: Piece,
+        level: usize,
+        place: &[u32],
+    ) -> Result<Vec<(Tree<S::Record>, Option<Carried>)>> {
+        let large = piece.mesh.triangles.len() > 4 * self.options.desired_tris as usize;
+        let pieces = self.divide(piece, level);
+        let build = |(number, piece): (usize, Piece)| {
+            let mut child_place = place.to_vec();
+            child_place.push(number as u32);
+            self.subtree(piece, level + 1, &child_place)
+        };
+        if large {
+            pieces.into_par_iter().enumerate().map(build).collect()
+        } else {
+            pieces.into_iter().enumerate().map(build).collect()
+        }
+    }
+
+    /// Cuts a piece by `level_factor - 1` planes across its longest side; pieces without
+    /// triangles are left out.
+    pub fn divide(&self, piece: Piece, level: usize) -> Vec<Piece> {
+        let Some((low, high)) = piece.mesh.bounds() else { return vec![piece] };
+        let side = |axis: usize| f64::from(high[axis]) - f64::from(low[axis]);
+        let axis = (1..3).fold(0, |best, axis| if side(axis) > side(best) { axis } else { best });
+        let slabs = self.options.level_factor;
+        let planes: Vec<f32> = (1..slabs)
+            .map(|i| {
+                let share = f64::from(i) / f64::from(slabs);
+                self.lattice.round(f64::from(low[axis]) + side(axis) * share) as f32
+            })
+            .collect();
+        let shares: Vec<f64> = self.factors[level + 1..]
+            .iter()
+            .map(|factor| match self.options.borders {
+                BorderMode::Locked => 1.0,
+                BorderMode::Shared | BorderMode::Skirts => 1.0 / factor.sqrt(),
+            })
+            .collect();
+        let locked = self.options.borders == BorderMode::Locked;
+        let rule = KeepRule {
+            shares,
+            first_level: level as u8 + 1,
+            collinear: if locked { -1.0 } else { self.lattice.step },
+        };
+        let mut pieces = Vec::with_capacity(slabs as usize);
+        self.bisect(piece, axis, &planes, &rule, &mut pieces);
+        pieces
+    }
+
+    /// Cuts at the middle plane, then each half at its own.
+    fn bisect(
+        &self,
+        piece: Piece,
+        axis: usize,
+        planes: &[f32],
+        rule: &KeepRule,
+        pieces: &mut Vec<Piece>,
+    ) {
+        if piece.mesh.triangles.is_empty() {
+            return;
+        }
+        if planes.is_empty() {
+            pieces.push(piece);
+            return;
+        }
+        let middle = planes.len() / 2;
+        let (below, above) = cut(
+            piece,
+            &Cut {
+                axis,
+                coordinate: planes[middle],
+                lattice: Some(self.lattice),
+                tolerance: self.options.tolerance,
+                rule,
+            },
+        );
+        self.bisect(below, axis, &planes[..middle], rule, pieces);
+        self.bisect(above, axis, &planes[middle + 1..], rule, pieces);
+    }
+
+    /// Simplifies and writes a node that is not a leaf.
+    fn coarse_node(
+        &self,
+        source: Carried,
+        path: &Path,
+        level: usize,
+        place: &[u32],
+        budget: usize,
+    ) -> Result<(S::Record, Carried)> {
+        let Carried { mut mesh, mut border, error: error_below } = source;
+        let at = level as u8;
+        thin_border(&mut mesh, &mut border, path, at);
+        let skirts = match self.options.borders {
+            BorderMode::Skirts => skirts(&mesh, &border, path, at, self.lattice.step),
+            BorderMode::Locked | BorderMode::Shared => Vec::new(),
+        };
+        // Skirts count towards the budget, but may not take more than half of it.
+        let skirt_triangles = skirts.len() * TRIANGLES_PER_SKIRT;
+        let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
+        let Simplified { mesh, border, error, step } =
+            simplify(mesh, border, path, at, target, self.options.simplifier, self.options.weights);
+        // The skirts' vertices were renumbered with the mesh: look them up again.
+        let skirts = match self.options.borders {
+            BorderMode::Skirts => super::skirt::skirts(&mesh, &border, path, at, self.lattice.step),
+            BorderMode::Locked | BorderMode::Shared => skirts,
+        };
+        let total_error = error_below + error;
+        let record = self.sink.take(&NodeDraft {
+            mesh: &mesh,
+            skirts: &skirts,
+            level,
+            place,
+            budget,
+            geometric_error: total_error,
+            step,
+        })?;
+        Ok((record, Carried { mesh, border, error: total_error }))
+    }
+}

@@ -1,0 +1,271 @@
+//! Bringing a node to its triangle budget: the ladder from careful to sure.
+//!
+//! 1. Quadric edge collapse with attributes (Garland & Heckbert as meshoptimizer has it, with
+//!    vertex positions and attributes solved for afterwards), inside texture seams.
+//! 2. The same, allowed to collapse across texture seams but not across material borders.
+//! 3. Vertex clustering ([`super::cluster`]), which has no topology to respect.
+//!
+//! Border vertices that the level keeps are locked throughout.
+
+use meshopt::{SimplifyOptions, SimplifyVertex};
+use rustc_hash::FxHashMap;
+
+use super::border::{Border, Fate, Path};
+use super::cluster::cluster;
+use super::compact::compact;
+use super::thin_border::thin_border;
+use crate::mesh::{Mesh, PositionKey, key};
+
+/// Which method makes the coarse levels.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum Simplifier {
+    /// Quadric error metrics, with the ladder below it.
+    #[default]
+    Qem,
+    /// Vertex clustering alone (Cozzi & Loo, section 3).
+    Clustering,
+}
+
+/// The step of the ladder that gave a node its triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LadderStep {
+    /// The piece as it is: a leaf.
+    Original,
+    /// Edge collapse inside texture seams.
+    Collapse,
+    /// Edge collapse across texture seams.
+    Permissive,
+    /// Vertex clustering.
+    Clustering,
+}
+
+/// Weights of the appearance against the geometry.
+#[derive(Clone, Copy, Debug)]
+pub struct AppearanceWeights {
+    /// A shift of the texture by one metre of surface counts as this many metres of distance.
+    pub texture: f32,
+    /// A change of vertex colour from 0 to 1 counts as this share of the piece's extent.
+    pub color: f32,
+}
+
+impl Default for AppearanceWeights {
+    fn default() -> Self {
+        Self { texture: 0.25, color: 0.05 }
+    }
+}
+
+/// A node may exceed its budget by this factor before the ladder goes on.
+pub const BUDGET_TOLERANCE: f64 = 1.1;
+
+/// A simplified piece.
+#[derive(Clone, Debug)]
+pub struct Simplified {
+    /// Its geometry, with source texture coordinates.
+    pub mesh: Mesh,
+    /// Border facts of its vertices.
+    pub border: Border,
+    /// An upper estimate of the distance that it moved from the input, metres.
+    pub error: f64,
+    /// How it was made.
+    pub step: LadderStep,
+}
+
+/// Simplifies `mesh` to at most about `target` triangles as a node of `path` at `level`.
+pub fn simplify(
+    mut mesh: Mesh,
+    mut border: Border,
+    path: &Path,
+    level: u8,
+    target: usize,
+    simplifier: Simplifier,
+    weights: AppearanceWeights,
+) -> Simplified {
+    thin_border(&mut mesh, &mut border, path, level);
+    let (mesh, border) = compact(&mesh, &border);
+    let locked: Vec<bool> = border
+        .planes
+        .iter()
+        .zip(&border.keep)
+        .map(|(&planes, &keep)| path.fate(planes, keep, level) != Fate::Free)
+        .collect();
+    let limit = (target as f64 * BUDGET_TOLERANCE) as usize;
+    if simplifier == Simplifier::Clustering {
+        return clustered(&mesh, &border, &locked, target);
+    }
+    let mut best = Simplified { mesh, border, error: 0.0, step: LadderStep::Collapse };
+    if best.mesh.triangles.len() <= target {
+        return best;
+    }
+    let source = best.clone();
+    for step in [LadderStep::Collapse, LadderStep::Permissive] {
+        let result = collapse(&source.mesh, &source.border, &locked, target, step, weights);
+        if step == LadderStep::Collapse || result.mesh.triangles.len() < best.mesh.triangles.len() {
+            best = result;
+        }
+        if best.mesh.triangles.len() <= limit {
+            return best;
+        }
+        if step == LadderStep::Collapse && source.mesh.texcoords.is_empty() {
+            // Without textures the only seams are material borders, which stay protected.
+            break;
+        }
+    }
+    let result = clustered(&source.mesh, &source.border, &locked, target);
+    if result.mesh.triangles.len() < best.mesh.triangles.len() { result } else { best }
+}
+
+fn clustered(mesh: &Mesh, border: &Border, locked: &[bool], target: usize) -> Simplified {
+    let (mesh, border, error) = cluster(mesh, border, locked, target);
+    Simplified { mesh, border, error, step: LadderStep::Clustering }
+}
+
+/// One run of meshoptimizer's edge collapse.
+fn collapse(
+    mesh: &Mesh,
+    border: &Border,
+    locked: &[bool],
+    target: usize,
+    step: LadderStep,
+    weights: AppearanceWeights,
+) -> Simplified {
+    let mut indices: Vec<u32> = mesh.triangles.as_flattened().to_vec();
+    let mut positions = mesh.positions.clone();
+    let (mut attributes, attribute_weights) = attributes_of(mesh, weights);
+    let stride = attribute_weights.len() * size_of::<f32>();
+    let mut locks: Vec<SimplifyVertex> = locked
+        .iter()
+        .map(|&locked| if locked { SimplifyVertex::Lock } else { SimplifyVertex::None })
+        .collect();
+    let mut options = SimplifyOptions::ErrorAbsolute;
+    if step == LadderStep::Permissive {
+        options |= SimplifyOptions::Permissive;
+        protect_material_borders(mesh, &mut locks);
+    }
+    let mut error = 0f32;
+    let count = meshopt::simplify_with_update(
+        &mut indices,
+        &mut positions,
+        &mut attributes,
+        &attribute_weights,
+        stride,
+        Some(&locks),
+        target * 3,
+        f32::MAX,
+        options,
+        Some(&mut error),
+    );
+    indices.truncate(count);
+    restore_unmoved(&mut positions, &mesh.positions);
+    let mut result = Mesh {
+        positions,
+        texcoords: mesh.texcoords.clone(),
+        colors: mesh.colors.clone(),
+        materials: mesh.materials.clone(),
+        triangles: bytemuck::allocation::cast_vec(indices_to_triangles(indices)),
+    };
+    write_attributes(&mut result, &attributes, attribute_weights.len());
+    let (mesh, border) = compact(&result, border);
+    Simplified { mesh, border, error: f64::from(error), step }
+}
+
+fn indices_to_triangles(indices: Vec<u32>) -> Vec<[u32; 3]> {
+    indices.as_chunks::<3>().0.to_vec()
+}
+
+/// meshoptimizer scales positions to a unit box and back, so a vertex that it did not move may
+/// differ in its last bits; such a vertex gets its exact position again.
+fn restore_unmoved(positions: &mut [[f32; 3]], originals: &[[f32; 3]]) {
+    let extent = originals.iter().flatten().fold(0f32, |most, c| most.max(c.abs()));
+    let drift = extent * 4.0 * f32::EPSILON;
+    for (position, original) in positions.iter_mut().zip(originals) {
+        if position.iter().zip(original).all(|(new, old)| (new - old).abs() <= drift) {
+            *position = *original;
+        }
+    }
+}
+
+/// Interleaved attributes and their weights. Texture coordinates are weighted so that a shift
+/// counts by its length on the surface, whatever the texture's size is.
+fn attributes_of(mesh: &Mesh, weights: AppearanceWeights) -> (Vec<f32>, Vec<f32>) {
+    let textured = !mesh.texcoords.is_empty();
+    let colored = !mesh.colors.is_empty();
+    let mut attribute_weights = Vec::new();
+    if textured {
+        let weight = weights.texture * metres_per_texcoord(mesh) / extent_of(mesh);
+        attribute_weights.extend([weight; 2]);
+    }
+    if colored {
+        attribute_weights.extend([weights.color; 3]);
+    }
+    let mut attributes = Vec::with_capacity(mesh.positions.len() * attribute_weights.len());
+    for vertex in 0..mesh.positions.len() {
+        if textured {
+            attributes.extend(mesh.texcoords[vertex]);
+        }
+        if colored {
+            let [r, g, b, _] = mesh.colors[vertex];
+            attributes.extend([r, g, b].map(|channel| f32::from(channel) / 65535.0));
+        }
+    }
+    (attributes, attribute_weights)
+}
+
+fn write_attributes(mesh: &mut Mesh, attributes: &[f32], per_vertex: usize) {
+    if per_vertex == 0 {
+        return;
+    }
+    let color_at = if mesh.texcoords.is_empty() { 0 } else { 2 };
+    for (vertex, values) in attributes.chunks_exact(per_vertex).enumerate() {
+        if let Some(texcoord) = mesh.texcoords.get_mut(vertex) {
+            *texcoord = [values[0], values[1]];
+        }
+        if let Some(color) = mesh.colors.get_mut(vertex) {
+            for channel in 0..3 {
+                let value = values[color_at + channel].clamp(0.0, 1.0);
+                color[channel] = (value * 65535.0).round() as u16;
+            }
+        }
+    }
+}
+
+/// The square root of surface area over texture area: how many metres one unit of texture
+/// coordinate covers. 0 where nothing is textured.
+fn metres_per_texcoord(mesh: &Mesh) -> f32 {
+    let (mut surface, mut texture) = (0f64, 0f64);
+    for &triangle in &mesh.triangles {
+        let [a, b, c] =
+            triangle.map(|vertex| glam::Vec2::from(mesh.texcoords[vertex as usize]).as_dvec2());
+        let area = (b - a).perp_dot(c - a).abs() * 0.5;
+        if area > 0.0 {
+            texture += area;
+            surface += mesh.triangle_area(triangle);
+        }
+    }
+    if texture > 0.0 { (surface / texture).sqrt() as f32 } else { 0.0 }
+}
+
+/// The longest side of the bounding box, metres; never 0.
+fn extent_of(mesh: &Mesh) -> f32 {
+    mesh.bounds()
+        .map_or(1.0, |(low, high)| (0..3).map(|i| high[i] - low[i]).fold(0.0, f32::max))
+        .max(f32::MIN_POSITIVE)
+}
+
+/// Marks the vertices at which two materials meet.
+fn protect_material_borders(mesh: &Mesh, locks: &mut [SimplifyVertex]) {
+    let mut first: FxHashMap<PositionKey<f32>, (u32, bool)> = FxHashMap::default();
+    for (vertex, &position) in mesh.positions.iter().enumerate() {
+        let material = mesh.materials[vertex];
+        let entry = first.entry(key(position)).or_insert((material, false));
+        entry.1 |= entry.0 != material;
+    }
+    for (vertex, lock) in locks.iter_mut().enumerate() {
+        if first[&key(mesh.positions[vertex])].1 {
+            *lock |= SimplifyVertex::Protect;
+        }
+    }
+}

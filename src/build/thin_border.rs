@@ -1,0 +1,133 @@
+//! Moving the border vertices that a level does without onto their kept neighbours.
+//!
+//! A half-edge collapse along the border: nothing but an index changes, so texture coordinates
+//! stay those of a vertex of the same chart. Both sides of a plane do the same, since which
+//! vertices go was decided by the plane ([`super::chain`]).
+
+use rustc_hash::FxHashMap;
+
+use super::border::{Border, Fate, Path};
+use crate::mesh::{Mesh, PositionKey, key, wide};
+
+/// The open edges of a mesh whose ends share a plane of `path`: each once, as the triangle that
+/// has it winds.
+pub fn border_edges(mesh: &Mesh, border: &Border, path: &Path) -> Vec<[u32; 2]> {
+    let bits = path.bits();
+    let mut count: FxHashMap<[PositionKey<f32>; 2], (u32, [u32; 2])> = FxHashMap::default();
+    if bits == 0 {
+        return Vec::new();
+    }
+    let planes = |vertex: u32| border.planes[vertex as usize] & bits;
+    for &[a, b, c] in &mesh.triangles {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            if planes(from) & planes(to) != 0 {
+                let ends = [from, to].map(|vertex| key(mesh.positions[vertex as usize]));
+                let edge = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
+                count.entry(edge).or_insert((0, [from, to])).0 += 1;
+            }
+        }
+    }
+    let mut edges: Vec<[u32; 2]> =
+        count.into_values().filter(|(uses, _)| *uses == 1).map(|(_, edge)| edge).collect();
+    edges.sort_unstable();
+    edges
+}
+
+/// Collapses the vertices that are gone at `level`; returns how many could not be, because they
+/// are on a seam or the border branches there. Those become kept.
+pub fn thin_border(mesh: &mut Mesh, border: &mut Border, path: &Path, level: u8) -> usize {
+    let gone = |border: &Border, vertex: usize| {
+        path.fate(border.planes[vertex], border.keep[vertex], level) == Fate::Gone
+    };
+    let candidates: Vec<u32> =
+        (0..mesh.positions.len()).filter(|&v| gone(border, v)).map(|v| v as u32).collect();
+    if candidates.is_empty() {
+        return 0;
+    }
+    // Two neighbours along the border, by vertex; more or fewer, or another vertex at the same
+    // place, and it stays.
+    let mut wedges: FxHashMap<PositionKey<f32>, u32> = FxHashMap::default();
+    let mut on_seam = vec![false; mesh.positions.len()];
+    for (vertex, &position) in mesh.positions.iter().enumerate() {
+        if border.planes[vertex] & path.bits() != 0
+            && let Some(other) = wedges.insert(key(position), vertex as u32)
+        {
+            on_seam[vertex] = true;
+            on_seam[other as usize] = true;
+        }
+    }
+    let mut neighbours: FxHashMap<u32, ([u32; 2], u32)> = FxHashMap::default();
+    for [a, b] in border_edges(mesh, border, path) {
+        for (from, to) in [(a, b), (b, a)] {
+            let entry = neighbours.entry(from).or_insert(([u32::MAX; 2], 0));
+            if let Some(slot) = entry.0.get_mut(entry.1 as usize) {
+                *slot = to;
+            }
+            entry.1 += 1;
+        }
+    }
+    let mut stuck = 0;
+    for &vertex in &candidates {
+        let two = neighbours.get(&vertex).is_some_and(|(_, count)| *count == 2);
+        if !two || on_seam[vertex as usize] {
+            border.keep[vertex as usize] = 0;
+            stuck += 1;
+        }
+    }
+    let mut target: FxHashMap<u32, u32> = FxHashMap::default();
+    for &vertex in &candidates {
+        if !gone(border, vertex as usize) {
+            continue;
+        }
+        let ends = neighbours[&vertex]
+            .0
+            .map(|first| walk(mesh, vertex, first, &neighbours, |v| gone(border, v as usize)));
+        let nearest = match ends {
+            [Some(a), Some(b)] => {
+                let nearer = a.1.total_cmp(&b.1).then_with(|| {
+                    key(mesh.positions[a.0 as usize]).cmp(&key(mesh.positions[b.0 as usize]))
+                });
+                Some(if nearer.is_le() { a.0 } else { b.0 })
+            }
+            [Some(end), None] | [None, Some(end)] => Some(end.0),
+            [None, None] => None,
+        };
+        match nearest {
+            Some(end) => _ = target.insert(vertex, end),
+            None => stuck += 1,
+        }
+    }
+    for triangle in &mut mesh.triangles {
+        for corner in triangle.iter_mut() {
+            if let Some(&end) = target.get(corner) {
+                *corner = end;
+            }
+        }
+    }
+    mesh.triangles.retain(|&[a, b, c]| a != b && b != c && c != a);
+    stuck
+}
+
+/// From `start` through `next` along the border to the first vertex that stays, and how far it is
+/// along the way.
+fn walk(
+    mesh: &Mesh,
+    start: u32,
+    next: u32,
+    neighbours: &FxHashMap<u32, ([u32; 2], u32)>,
+    gone: impl Fn(u32) -> bool,
+) -> Option<(u32, f64)> {
+    let point = |vertex: u32| wide(mesh.positions[vertex as usize]);
+    let (mut before, mut at) = (start, next);
+    let mut length = point(start).distance(point(next));
+    while gone(at) {
+        let [a, b] = neighbours.get(&at)?.0;
+        let onward = if a == before { b } else { a };
+        length += point(at).distance(point(onward));
+        (before, at) = (at, onward);
+        if at == start {
+            return None;
+        }
+    }
+    Some((at, length))
+}

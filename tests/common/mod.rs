@@ -1,0 +1,173 @@
+//! Meshes and a sink in memory for the tests of the build.
+#![allow(dead_code)]
+
+use std::sync::Mutex;
+
+use hlod::build::border::{Border, Path};
+use hlod::build::cut::Piece;
+use hlod::build::hierarchy::{
+    BlockBuilder, HierarchyOptions, NodeDraft, NodeSink, Tree, simplifications,
+};
+use hlod::build::lattice::Lattice;
+use hlod::build::simplify::LadderStep;
+use hlod::mesh::{Mesh, PositionKey, key};
+
+/// A fixed sequence of numbers in 0–1.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((self.0 >> 33) as f64) / (1u64 << 31) as f64
+    }
+}
+
+/// A closed bumpy ball: a cube's faces as grids of `n` by `n` quads, blown up.
+pub fn ball(n: usize, radius: f64, bump: f64, seed: u64) -> Mesh<f64> {
+    let mut random = Random(seed);
+    let mut bumps = std::collections::BTreeMap::new();
+    let mut mesh = Mesh::<f64>::default();
+    let mut numbers = std::collections::BTreeMap::new();
+    for face in 0..6 {
+        let axis = face / 2;
+        let sign = if face % 2 == 0 { 1i64 } else { -1 };
+        let m = n as i64;
+        for i in 0..n as i64 {
+            for j in 0..n as i64 {
+                let corner = |di: i64, dj: i64| {
+                    let mut at = [0i64; 3];
+                    at[axis] = sign * m;
+                    at[(axis + 1) % 3] = 2 * (i + di) - m;
+                    at[(axis + 2) % 3] = 2 * (j + dj) - m;
+                    at
+                };
+                let quad = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+                let mut index = |at: [i64; 3]| {
+                    *numbers.entry(at).or_insert_with(|| {
+                        let bump =
+                            *bumps.entry(at).or_insert_with(|| 1.0 + bump * (random.next() - 0.5));
+                        let p = glam::DVec3::new(at[0] as f64, at[1] as f64, at[2] as f64)
+                            .normalize()
+                            * radius
+                            * bump;
+                        mesh.positions.push(p.into());
+                        mesh.materials.push(0);
+                        mesh.positions.len() as u32 - 1
+                    })
+                };
+                let [a, b, c, d] = quad.map(&mut index);
+                let (t1, t2) = ([a, b, c], [a, c, d]);
+                for t in [t1, t2] {
+                    mesh.triangles.push(if sign > 0 { t } else { [t[0], t[2], t[1]] });
+                }
+            }
+        }
+    }
+    mesh
+}
+
+/// An open, textured, bumpy wall of `n` by `m` quads, two charts side by side, with holes.
+pub fn wall(n: usize, m: usize, seed: u64) -> Mesh<f64> {
+    let mut random = Random(seed);
+    let heights: Vec<f64> = (0..(n + 1) * (m + 1)).map(|_| random.next() * 0.03).collect();
+    let mut mesh = Mesh::<f64>::default();
+    for chart in 0..2 {
+        let (from, to) = if chart == 0 { (0, n / 2) } else { (n / 2, n) };
+        let first = mesh.positions.len() as u32;
+        for i in from..=to {
+            for j in 0..=m {
+                mesh.positions.push([i as f64 * 0.1, heights[i * (m + 1) + j], j as f64 * 0.1]);
+                let u = (i - from) as f32 / n as f32 + 0.5 * chart as f32;
+                mesh.texcoords.push([u, 1.0 - j as f32 / m as f32]);
+                mesh.materials.push(0);
+            }
+        }
+        for i in 0..to - from {
+            for j in 0..m {
+                let at = |i: usize, j: usize| first + (i * (m + 1) + j) as u32;
+                if random.next() < 0.01 {
+                    continue;
+                }
+                mesh.triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                mesh.triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+    }
+    mesh
+}
+
+/// A gathered mesh as a block at the origin.
+pub fn block(mesh: Mesh<f64>) -> (Piece, Lattice) {
+    let (low, high) = mesh.bounds().unwrap();
+    let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
+    let lattice = Lattice::for_extent(extent, extent);
+    let border = Border::interior(mesh.positions.len());
+    let piece = Piece { mesh, border, path: Path::default() };
+    (hlod::build::gather::localise(&piece, [0.0; 3], lattice).0, lattice)
+}
+
+/// A node as the sink saw it.
+#[derive(Clone, Debug)]
+pub struct Kept {
+    pub mesh: Mesh,
+    pub skirts: Vec<hlod::build::skirt::Skirt>,
+    pub level: usize,
+    pub place: Vec<u32>,
+    pub budget: usize,
+    pub error: f64,
+    pub step: LadderStep,
+}
+
+/// Keeps all nodes.
+#[derive(Default)]
+pub struct MemorySink(pub Mutex<Vec<Kept>>);
+
+impl NodeSink for MemorySink {
+    type Record = ();
+
+    fn take(&self, node: &NodeDraft) -> hlod::Result<()> {
+        self.0.lock().unwrap().push(Kept {
+            mesh: node.mesh.clone(),
+            skirts: node.skirts.to_vec(),
+            level: node.level,
+            place: node.place.to_vec(),
+            budget: node.budget,
+            error: node.geometric_error,
+            step: node.step,
+        });
+        Ok(())
+    }
+}
+
+/// Builds a block in memory; nodes sorted by level and place.
+pub fn build(piece: Piece, lattice: Lattice, options: &HierarchyOptions) -> Vec<Kept> {
+    let sink = MemorySink::default();
+    let factors = simplifications(piece.mesh.triangles.len(), options);
+    let builder = BlockBuilder { options, factors, lattice, sink: &sink };
+    let _tree: Tree<()> = builder.build(piece).unwrap();
+    let mut nodes = sink.0.into_inner().unwrap();
+    nodes.sort_by(|a, b| (a.level, &a.place).cmp(&(b.level, &b.place)));
+    nodes
+}
+
+/// Uses of each edge by position; an edge is its two ends in key order.
+pub fn edge_uses<'a>(
+    meshes: impl IntoIterator<Item = &'a Mesh>,
+) -> std::collections::BTreeMap<[PositionKey<f32>; 2], u32> {
+    let mut uses = std::collections::BTreeMap::new();
+    for mesh in meshes {
+        for &[a, b, c] in &mesh.triangles {
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                let mut ends = [from, to].map(|v| key(mesh.positions[v as usize]));
+                ends.sort();
+                *uses.entry(ends).or_insert(0) += 1;
+            }
+        }
+    }
+    uses
+}
+
+/// Edges that are not used an even number of times.
+pub fn odd_edges<'a>(meshes: impl IntoIterator<Item = &'a Mesh>) -> usize {
+    edge_uses(meshes).values().filter(|&&uses| uses % 2 == 1).count()
+}

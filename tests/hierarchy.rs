@@ -1,0 +1,178 @@
+//! Properties of the tree over one block, on small random meshes.
+
+mod common;
+
+use std::collections::BTreeSet;
+
+use common::*;
+use hlod::build::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom, simplifications};
+use hlod::build::simplify::{LadderStep, Simplifier};
+use hlod::mesh::key;
+
+fn every_option() -> Vec<HierarchyOptions> {
+    let mut all = Vec::new();
+    for level_factor in [2, 3, 4, 8] {
+        for simplify_from in [SimplifyFrom::Original, SimplifyFrom::Children] {
+            for borders in [BorderMode::Locked, BorderMode::Shared, BorderMode::Skirts] {
+                for simplifier in [Simplifier::Qem, Simplifier::Clustering] {
+                    all.push(HierarchyOptions {
+                        desired_tris: 150,
+                        level_factor,
+                        simplify_from,
+                        borders,
+                        simplifier,
+                        ..Default::default()
+                    });
+                }
+            }
+        }
+    }
+    all
+}
+
+#[test]
+fn factors_follow_the_thesis() {
+    let options = HierarchyOptions::default();
+    assert_eq!(simplifications(900, &options), [1.0], "within the budget: one node");
+    assert_eq!(simplifications(901, &options).len(), 2);
+    assert_eq!(simplifications(900 * 64, &options), [64.0, 16.0, 4.0, 1.0]);
+    let factors = simplifications(230_000, &options);
+    assert!((factors[0] - 255.5555).abs() < 1e-3);
+    assert_eq!(factors.len(), 5, "255.6, 63.9, 16.0, 3.99, and the original");
+}
+
+#[test]
+fn leaves_are_the_source() {
+    for (mesh, name) in [(ball(12, 5.0, 0.1, 1), "ball"), (wall(60, 24, 2), "wall")] {
+        let (piece, lattice) = block(mesh);
+        let area = piece.mesh.area();
+        let source: BTreeSet<_> = piece.mesh.positions.iter().map(|&p| key(p)).collect();
+        for options in every_option() {
+            let nodes = build(piece.clone(), lattice, &options);
+            let deepest = nodes.iter().map(|node| node.level).max().unwrap();
+            let leaves: Vec<_> = nodes.iter().filter(|node| node.level == deepest).collect();
+            assert!(leaves.iter().all(|leaf| leaf.step == LadderStep::Original));
+            assert!(leaves.iter().all(|leaf| leaf.skirts.is_empty() && leaf.error == 0.0));
+            let leaf_area: f64 = leaves.iter().map(|leaf| leaf.mesh.area()).sum();
+            assert!((leaf_area / area - 1.0).abs() < 1e-6, "{name}: {leaf_area} of {area}");
+            let found: BTreeSet<_> =
+                leaves.iter().flat_map(|leaf| &leaf.mesh.positions).map(|&p| key(p)).collect();
+            assert!(source.is_subset(&found), "{name}: a source vertex is lost");
+        }
+    }
+}
+
+/// Edges of a front that only one node has, and that are neither edges of the original border
+/// nor under a skirt: through these one could see.
+fn unsealed(front: &[&Kept], leaf_edges: &BTreeSet<[hlod::mesh::PositionKey<f32>; 2]>) -> usize {
+    let open = edge_uses(front.iter().map(|node| &node.mesh));
+    let skirted: BTreeSet<_> = front
+        .iter()
+        .flat_map(|node| node.skirts.iter().map(|skirt| (&node.mesh, skirt.edge)))
+        .map(|(mesh, edge)| {
+            let mut ends = edge.map(|vertex| key(mesh.positions[vertex as usize]));
+            ends.sort();
+            ends
+        })
+        .collect();
+    open.iter()
+        .filter(|&(edge, uses)| {
+            uses % 2 == 1 && !skirted.contains(edge) && !leaf_edges.contains(edge)
+        })
+        .count()
+}
+
+#[test]
+fn a_closed_mesh_with_locked_borders_stays_closed_at_every_level() {
+    let (piece, lattice) = block(ball(16, 5.0, 0.05, 3));
+    assert_eq!(odd_edges([&piece.mesh]), 0);
+    for options in every_option() {
+        let nodes = build(piece.clone(), lattice, &options);
+        let deepest = nodes.iter().map(|node| node.level).max().unwrap();
+        for level in 0..=deepest {
+            let at_level = nodes.iter().filter(|node| node.level == level).map(|node| &node.mesh);
+            let locked =
+                options.borders == BorderMode::Locked && options.simplifier == Simplifier::Qem;
+            if level == deepest || locked {
+                assert_eq!(odd_edges(at_level), 0, "level {level} of {options:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn any_front_of_a_closed_mesh_is_sealed() {
+    let (piece, lattice) = block(ball(16, 5.0, 0.05, 3));
+    let mut random = Random(9);
+    for options in every_option() {
+        if options.borders != BorderMode::Skirts || options.simplifier == Simplifier::Clustering {
+            continue;
+        }
+        let nodes = build(piece.clone(), lattice, &options);
+        let deepest = nodes.iter().map(|node| node.level).max().unwrap();
+        let leaf_edges: BTreeSet<_> =
+            edge_uses(nodes.iter().filter(|node| node.level == deepest).map(|node| &node.mesh))
+                .into_keys()
+                .collect();
+        for _ in 0..20 {
+            let mut front = Vec::new();
+            let mut open = vec![Vec::new()];
+            while let Some(place) = open.pop() {
+                let node = nodes.iter().find(|node| node.place == place).unwrap();
+                let children: Vec<_> = nodes
+                    .iter()
+                    .filter(|child| {
+                        child.place.len() == place.len() + 1 && child.place.starts_with(&place)
+                    })
+                    .map(|child| child.place.clone())
+                    .collect();
+                if children.is_empty() || (node.level > 0 && random.next() < 0.4) {
+                    front.push(node);
+                } else {
+                    open.extend(children);
+                }
+            }
+            assert_eq!(unsealed(&front, &leaf_edges), 0, "{} nodes of {options:?}", front.len());
+        }
+    }
+}
+
+#[test]
+fn nodes_keep_their_budget() {
+    for mesh in [ball(24, 5.0, 0.05, 3), wall(120, 40, 4)] {
+        let (piece, lattice) = block(mesh);
+        for options in every_option() {
+            for node in build(piece.clone(), lattice, &options) {
+                let triangles = node.mesh.triangles.len() + 2 * node.skirts.len();
+                if options.borders != BorderMode::Locked {
+                    assert!(
+                        triangles as f64 <= node.budget as f64 * 1.1 + 2.0,
+                        "{triangles} of {} at level {} {:?} {options:?}",
+                        node.budget,
+                        node.level,
+                        node.step
+                    );
+                }
+                assert!(!node.mesh.triangles.is_empty());
+            }
+        }
+    }
+}
+
+#[test]
+fn errors_grow_towards_the_root() {
+    let (piece, lattice) = block(wall(120, 40, 5));
+    for options in every_option() {
+        if options.simplify_from == SimplifyFrom::Original {
+            continue; // The tree's owner makes those monotone.
+        }
+        let nodes = build(piece.clone(), lattice, &options);
+        for node in nodes.iter().filter(|node| !node.place.is_empty()) {
+            let parent = nodes
+                .iter()
+                .find(|parent| parent.place[..] == node.place[..node.place.len() - 1])
+                .unwrap();
+            assert!(parent.error >= node.error);
+        }
+    }
+}
