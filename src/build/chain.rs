@@ -48,6 +48,9 @@ pub struct KeepRule {
     /// For each level from the coarsest node that the plane bounds down to the leaves, the share
     /// of the border's vertices that is kept, 0–1; the last entry (leaves) is 1.
     pub shares: Vec<f64>,
+    /// For each of these levels, the most vertices that are kept whatever the share is; parallel
+    /// to `shares`, not applied to the last entry.
+    pub most: Vec<f64>,
     /// The level of `shares[0]`.
     pub first_level: u8,
     /// Vertices closer than this to their chord are kept at the leaves only; metres.
@@ -89,7 +92,8 @@ impl<C: Coordinate> CutPlane<C> {
             } else {
                 rule.shares
                     .iter()
-                    .position(|share| (rank as f64) < (total * share).ceil())
+                    .zip(rule.most.iter().chain(std::iter::repeat(&f64::INFINITY)))
+                    .position(|(share, &most)| (rank as f64) < (total * share).ceil().min(most))
                     .unwrap_or(last)
             };
             chains[chain as usize].keep[index as usize] = rule.first_level + step as u8;
@@ -227,7 +231,7 @@ mod tests {
     }
 
     fn rule(shares: &[f64]) -> KeepRule {
-        KeepRule { shares: shares.to_vec(), first_level: 1, collinear: 1e-6 }
+        KeepRule { shares: shares.to_vec(), most: Vec::new(), first_level: 1, collinear: 1e-6 }
     }
 
     #[test]

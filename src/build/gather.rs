@@ -60,7 +60,8 @@ pub fn gather(model: &Model, parts: &[usize]) -> Piece<f64> {
 
 /// Cuts a gathered piece into the blocks of a [`Division`], in a fixed order.
 pub fn divide(piece: Piece<f64>, division: Division, shares: &[f64]) -> Vec<Piece<f64>> {
-    let rule = KeepRule { shares: shares.to_vec(), first_level: 0, collinear: 0.0 };
+    let rule =
+        KeepRule { shares: shares.to_vec(), most: Vec::new(), first_level: 0, collinear: 0.0 };
     match division {
         Division::Whole => vec![piece],
         Division::Halves { most } => {

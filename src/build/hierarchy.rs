@@ -11,10 +11,12 @@ use rayon::prelude::*;
 use super::border::{Border, Path};
 use super::chain::KeepRule;
 use super::cut::{Cut, CutTolerance, Piece, cut};
+use super::distance::hausdorff;
 use super::lattice::Lattice;
 use super::merge::merge;
 use super::simplify::{AppearanceWeights, LadderStep, Simplified, Simplifier, simplify};
 use super::skirt::{Skirt, TRIANGLES_PER_SKIRT, skirts};
+use super::stages::{Stage, Stages};
 use super::thin_border::thin_border;
 use crate::Result;
 use crate::mesh::Mesh;
@@ -49,6 +51,10 @@ pub enum BorderMode {
 
 /// A node may not be simplified to fewer triangles than this: a piece must not vanish.
 pub const LEAST_TRIANGLES: usize = 8;
+
+/// A node keeps at most one border vertex on a plane for this many triangles of its budget: each
+/// costs about a triangle of the mesh and two of a skirt, and a node has two planes.
+const BUDGET_PER_BORDER_VERTEX: f64 = 12.0;
 
 /// How one block is built.
 #[derive(Clone, Debug)]
@@ -113,6 +119,8 @@ pub struct NodeDraft<'a> {
     pub geometric_error: f64,
     /// How it was made.
     pub step: LadderStep,
+    /// Border vertices that were locked.
+    pub locked: usize,
 }
 
 /// Takes finished nodes, from many threads at once.
@@ -146,6 +154,8 @@ pub struct BlockBuilder<'a, S> {
     pub lattice: Lattice,
     /// Where nodes go.
     pub sink: &'a S,
+    /// Where the time goes.
+    pub stages: &'a Stages,
 }
 
 /// A node's geometry as its parent needs it.
@@ -181,6 +191,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
                 budget: triangles,
                 geometric_error: 0.0,
                 step: LadderStep::Original,
+                locked: 0,
             })?;
             self.sink.leaves_done(triangles);
             return Ok((Tree { record, children: Vec::new() }, None));
@@ -224,7 +235,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         place: &[u32],
     ) -> Result<Vec<(Tree<S::Record>, Option<Carried>)>> {
         let large = piece.mesh.triangles.len() > 4 * self.options.desired_tris as usize;
-        let pieces = self.divide(piece, level);
+        let pieces = self.stages.time(Stage::Cut, || self.divide(piece, level));
         let build = |(number, piece): (usize, Piece)| {
             let mut child_place = place.to_vec();
             child_place.push(number as u32);
@@ -258,8 +269,17 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             })
             .collect();
         let locked = self.options.borders == BorderMode::Locked;
+        // The deeper the level, the more nodes share the plane: as many as fit along its length.
+        let across = f64::from(self.options.level_factor).sqrt();
+        let most = (0..shares.len() - 1)
+            .map(|deeper| {
+                let each = f64::from(self.options.desired_tris) / BUDGET_PER_BORDER_VERTEX;
+                if locked { f64::INFINITY } else { (each * across.powi(deeper as i32)).ceil() }
+            })
+            .collect();
         let rule = KeepRule {
             shares,
+            most,
             first_level: level as u8 + 1,
             collinear: if locked { -1.0 } else { self.lattice.step },
         };
@@ -308,23 +328,30 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         place: &[u32],
         budget: usize,
     ) -> Result<(S::Record, Carried)> {
-        let Carried { mut mesh, mut border, error: error_below } = source;
+        let Carried { mesh: source_mesh, mut border, error: error_below } = source;
         let at = level as u8;
-        thin_border(&mut mesh, &mut border, path, at);
-        let skirts = match self.options.borders {
-            BorderMode::Skirts => skirts(&mesh, &border, path, at, self.lattice.step),
-            BorderMode::Locked | BorderMode::Shared => Vec::new(),
-        };
-        // Skirts count towards the budget, but may not take more than half of it.
-        let skirt_triangles = skirts.len() * TRIANGLES_PER_SKIRT;
-        let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
-        let Simplified { mesh, border, error, step } =
-            simplify(mesh, border, path, at, target, self.options.simplifier, self.options.weights);
-        // The skirts' vertices were renumbered with the mesh: look them up again.
-        let skirts = match self.options.borders {
-            BorderMode::Skirts => super::skirt::skirts(&mesh, &border, path, at, self.lattice.step),
-            BorderMode::Locked | BorderMode::Shared => skirts,
-        };
+        let with_skirts = self.options.borders == BorderMode::Skirts;
+        let step = self.lattice.step;
+        let (simplified, skirts) = self.stages.time(Stage::Simplify, || {
+            let mut mesh = source_mesh.clone();
+            thin_border(&mut mesh, &mut border, path, at);
+            // Skirts count towards the budget, but may not take more than half of it.
+            let skirt_triangles = match with_skirts {
+                true => skirts(&mesh, &border, path, at, step).len() * TRIANGLES_PER_SKIRT,
+                false => 0,
+            };
+            let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
+            let HierarchyOptions { simplifier, weights, .. } = *self.options;
+            let result = simplify(mesh, border, path, at, target, simplifier, weights);
+            // Simplification renumbers vertices, and clustering may take a border edge away.
+            let skirts = match with_skirts {
+                true => skirts(&result.mesh, &result.border, path, at, step),
+                false => Vec::new(),
+            };
+            (result, skirts)
+        });
+        let Simplified { mesh, border, step, .. } = simplified;
+        let error = self.stages.time(Stage::Measure, || hausdorff(&source_mesh, &mesh));
         let total_error = error_below + error;
         let record = self.sink.take(&NodeDraft {
             mesh: &mesh,
@@ -334,6 +361,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             budget,
             geometric_error: total_error,
             step,
+            locked: border.planes.iter().filter(|&&planes| planes & path.bits() != 0).count(),
         })?;
         Ok((record, Carried { mesh, border, error: total_error }))
     }

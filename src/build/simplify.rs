@@ -13,7 +13,6 @@ use rustc_hash::FxHashMap;
 use super::border::{Border, Fate, Path};
 use super::cluster::cluster;
 use super::compact::compact;
-use super::thin_border::thin_border;
 use crate::mesh::{Mesh, PositionKey, key};
 
 /// Which method makes the coarse levels.
@@ -74,17 +73,17 @@ pub struct Simplified {
     pub step: LadderStep,
 }
 
-/// Simplifies `mesh` to at most about `target` triangles as a node of `path` at `level`.
+/// Simplifies `mesh`, whose border is thinned already ([`super::thin_border`]), to at most about
+/// `target` triangles as a node of `path` at `level`.
 pub fn simplify(
-    mut mesh: Mesh,
-    mut border: Border,
+    mesh: Mesh,
+    border: Border,
     path: &Path,
     level: u8,
     target: usize,
     simplifier: Simplifier,
     weights: AppearanceWeights,
 ) -> Simplified {
-    thin_border(&mut mesh, &mut border, path, level);
     let (mesh, border) = compact(&mesh, &border);
     let locked: Vec<bool> = border
         .planes

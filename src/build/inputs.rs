@@ -1,0 +1,62 @@
+//! What a result was built from, and whether that has changed.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use crate::report::build_report::{FileReport, InputReport};
+use crate::{Error, Result};
+
+/// Sizes and hashes of the files of an input.
+pub fn describe(input: &Path, dependencies: &[PathBuf]) -> Result<InputReport> {
+    let files = dependencies.par_iter().map(|path| describe_file(path)).collect::<Result<_>>()?;
+    Ok(InputReport { path: text_of(input), files })
+}
+
+/// True where every file of an input is as it was.
+pub fn unchanged(earlier: &InputReport) -> bool {
+    !earlier.files.is_empty()
+        && earlier.files.par_iter().all(|file| {
+            let path = Path::new(&file.path);
+            let same_size = std::fs::metadata(path).is_ok_and(|facts| facts.len() == file.bytes);
+            same_size && describe_file(path).is_ok_and(|now| now == *file)
+        })
+}
+
+fn describe_file(path: &Path) -> Result<FileReport> {
+    let failed = |error: std::io::Error| Error::input(path, format!("cannot be read: {error}"));
+    let file = File::open(path).map_err(failed)?;
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(file).map_err(failed)?;
+    Ok(FileReport {
+        path: text_of(path),
+        bytes: hasher.count(),
+        blake3: hasher.finalize().to_hex().to_string(),
+    })
+}
+
+/// A path as text, for reports.
+pub fn text_of(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}
+
+/// A fingerprint of version, parameters and inputs.
+pub fn fingerprint(parameters: &serde_json::Value, inputs: &[InputReport]) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    let mut add = |text: &str| {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    };
+    add(env!("CARGO_PKG_VERSION"));
+    add(&parameters.to_string());
+    for input in inputs {
+        // Contents, not places: the same city in another folder is the same city.
+        let name = Path::new(&input.path).file_name().unwrap_or_default();
+        add(&name.to_string_lossy());
+        for file in &input.files {
+            add(&file.blake3);
+        }
+    }
+    *hasher.finalize().as_bytes()
+}
