@@ -7,6 +7,7 @@
 
 pub mod error;
 pub mod format;
+pub mod import;
 pub mod mesh;
 
 pub use error::{Error, Result};
