@@ -8,6 +8,7 @@
 pub mod build;
 pub mod error;
 pub mod format;
+pub mod import;
 pub mod mesh;
 
 pub use error::{Error, Result};

@@ -1,0 +1,82 @@
+//! Import: OBJ with MTL, glTF and GLB become [`Model`]s; pictures are found, and decoded on demand.
+//!
+//! Everything that later steps rely on is settled here: polygons are triangles, texture transforms
+//! are applied, node hierarchies are flattened in f64, coordinates are finite, indices are valid,
+//! and no triangle is degenerate or there twice. What had to be repaired is counted in
+//! [`Model::warnings`]; what cannot be read at all is an [`Error::Input`].
+
+mod clean;
+mod color;
+mod find;
+mod lines;
+mod mtl;
+mod obj;
+mod paths;
+mod picture;
+mod polygon;
+mod textures;
+mod tokens;
+mod vertices;
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::path::Path;
+
+pub use find::find_inputs;
+pub use picture::{Picture, decode_texture, texture_size};
+
+use crate::mesh::Model;
+use crate::{Error, Result};
+
+/// Reads one model file: OBJ, glTF or GLB, by its extension.
+pub fn load(path: &Path) -> Result<Model> {
+    match find::kind(path) {
+        Some(find::Kind::Obj) => obj::load(path),
+        Some(find::Kind::Gltf) => Err(Error::input(path, "glTF cannot be read yet")),
+        None => {
+            Err(Error::input(path, format!("not a model by its extension; {}", find::EXPECTED)))
+        }
+    }
+}
+
+/// Opens a model file.
+fn open(path: &Path) -> Result<File> {
+    let file = File::open(path)
+        .map_err(|error| Error::input(path, format!("cannot be opened: {error}")))?;
+    match file.metadata() {
+        Ok(metadata) if metadata.is_dir() => {
+            Err(Error::input(path, "is a folder; expected a model file"))
+        }
+        _ => Ok(file),
+    }
+}
+
+/// The name of a file without folder and extension, for groups that have no name of their own.
+fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
+}
+
+/// Brings a model into the form that [`Model`] promises, whatever format it comes from: materials
+/// of different names, groups and textures that are used, dependencies in order.
+fn assemble(mut model: Model) -> Result<Model> {
+    if model.parts.is_empty() {
+        let reasons: Vec<String> =
+            model.warnings.iter().map(|(what, times)| format!("{what} ({times})")).collect();
+        let what = format!("no triangle is left: {}", reasons.join("; "));
+        return Err(Error::input(model.source, what));
+    }
+    model.dependencies.sort();
+    model.dependencies.dedup();
+    let mut names = BTreeSet::new();
+    for material in &mut model.materials {
+        let given = if material.name.is_empty() { "default" } else { &material.name };
+        let mut name = given.to_owned();
+        let mut number = 2;
+        while !names.insert(name.clone()) {
+            name = format!("{given}.{number}");
+            number += 1;
+        }
+        material.name = name;
+    }
+    Ok(model)
+}

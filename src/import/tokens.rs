@@ -1,0 +1,193 @@
+//! Words, numbers and face corners of an OBJ line, from bytes.
+
+/// Splits off the first word of `rest`; `None` where only white space is left.
+pub(super) fn word<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
+    let start = rest.iter().position(|byte| !byte.is_ascii_whitespace())?;
+    let tail = &rest[start..];
+    let end = tail.iter().position(u8::is_ascii_whitespace).unwrap_or(tail.len());
+    *rest = &tail[end..];
+    Some(&tail[..end])
+}
+
+/// Powers of ten that f64 holds exactly.
+const EXACT_POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16,
+    1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
+];
+
+/// Reads a decimal number; correctly rounded. `None` where it is none.
+///
+/// What C runtimes print for a value that is no number (`nan`, `inf`, `-1.#IND`) is NaN or
+/// infinite, so that the caller can drop what uses it and go on.
+pub(super) fn number(word: &[u8]) -> Option<f64> {
+    plain_decimal(word).or_else(|| {
+        let text = std::str::from_utf8(word).ok()?;
+        text.parse().ok().or_else(|| {
+            let text = text.to_ascii_lowercase();
+            ["#", "nan", "inf"].iter().any(|mark| text.contains(mark)).then_some(f64::NAN)
+        })
+    })
+}
+
+/// `[+-]digits[.digits]` whose digits fit 2^53: mantissa and power of ten are exact in f64, and
+/// one correctly rounded division of the two is the correctly rounded value (Clinger 1990).
+fn plain_decimal(word: &[u8]) -> Option<f64> {
+    let (negative, digits) = match word {
+        [b'-', digits @ ..] => (true, digits),
+        [b'+', digits @ ..] => (false, digits),
+        digits => (false, digits),
+    };
+    // 18 digits cannot overflow the u64; the point takes one more place.
+    if digits.is_empty() || digits.len() > 19 {
+        return None;
+    }
+    let mut mantissa = 0_u64;
+    let mut point = None;
+    for (place, byte) in digits.iter().enumerate() {
+        let digit = byte.wrapping_sub(b'0');
+        if digit < 10 {
+            mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(digit));
+        } else if *byte == b'.' && point.is_none() {
+            point = Some(place);
+        } else {
+            return None;
+        }
+    }
+    let fraction_digits = match point {
+        Some(_) if digits.len() == 1 => return None,
+        Some(place) => digits.len() - 1 - place,
+        None if digits.len() > 18 => return None,
+        None => 0,
+    };
+    if mantissa > 1 << 53 {
+        return None;
+    }
+    let value = mantissa as f64 / EXACT_POWERS[fraction_digits];
+    Some(if negative { -value } else { value })
+}
+
+/// A corner of a face as written: `v`, `v/vt`, `v//vn` or `v/vt/vn`, each from 1 or, negative,
+/// counted back from the last; 0 stands for an index that is not there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Corner {
+    pub(super) position: i64,
+    pub(super) texcoord: i64,
+}
+
+/// Reads a face's corner. `None` where it is none. Normals are checked for form and left.
+#[inline]
+pub(super) fn corner(word: &[u8]) -> Option<Corner> {
+    let (position, rest) = index(word)?;
+    let mut corner = Corner { position, texcoord: 0 };
+    let [b'/', rest @ ..] = rest else {
+        return rest.is_empty().then_some(corner);
+    };
+    let rest = if rest.is_empty() || rest[0] == b'/' {
+        rest
+    } else {
+        let (texcoord, rest) = index(rest)?;
+        corner.texcoord = texcoord;
+        rest
+    };
+    match rest {
+        [] | [b'/'] => Some(corner),
+        [b'/', normal @ ..] => index(normal)?.1.is_empty().then_some(corner),
+        _ => None,
+    }
+}
+
+/// Reads an integer other than zero from the front of `bytes`; returns it and what follows.
+#[inline]
+fn index(bytes: &[u8]) -> Option<(i64, &[u8])> {
+    let (negative, digits) = match bytes {
+        [b'-', digits @ ..] => (true, digits),
+        digits => (false, digits),
+    };
+    let mut value = 0_i64;
+    let mut length = 0;
+    for byte in digits {
+        let digit = byte.wrapping_sub(b'0');
+        if digit > 9 {
+            break;
+        }
+        // Larger than any index there can be; saturating keeps it out of range.
+        value = value.saturating_mul(10).saturating_add(i64::from(digit));
+        length += 1;
+    }
+    if length == 0 || value == 0 {
+        return None;
+    }
+    Some((if negative { -value } else { value }, &digits[length..]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_equal_the_standard_librarys() {
+        for text in [
+            "0",
+            "-0",
+            "1",
+            "-1.5",
+            "+2.25",
+            "678031.705",
+            "5403578.539",
+            "-7.32421875682121e-06",
+            "40.646532816113904",
+            "0.00000000000000001",
+            "123456789012345678",
+            "1e300",
+            "1e-320",
+            "9007199254740993",
+            "9007199254740992",
+            ".5",
+            "5.",
+            "1837595.750",
+            "-0.000",
+            "12345678901234567.9",
+        ] {
+            let expected: f64 = text.parse().unwrap();
+            assert_eq!(number(text.as_bytes()).unwrap().to_bits(), expected.to_bits(), "{text}");
+        }
+    }
+
+    #[test]
+    fn words_for_no_number_are_nan_and_others_are_refused() {
+        for text in ["nan", "-nan(ind)", "1.#QNAN", "-1.#IND"] {
+            assert!(number(text.as_bytes()).unwrap().is_nan(), "{text}");
+        }
+        assert_eq!(number(b"-inf"), Some(f64::NEG_INFINITY));
+        for text in ["", ".", "-", "1,5", "1.2.3", "abc", "0x10", "\u{e9}"] {
+            assert_eq!(number(text.as_bytes()), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn corners_in_all_their_forms() {
+        let read =
+            |text: &str| corner(text.as_bytes()).map(|corner| (corner.position, corner.texcoord));
+        assert_eq!(read("7"), Some((7, 0)));
+        assert_eq!(read("7/8"), Some((7, 8)));
+        assert_eq!(read("7/8/9"), Some((7, 8)));
+        assert_eq!(read("7//9"), Some((7, 0)));
+        assert_eq!(read("-1/-2/-3"), Some((-1, -2)));
+        assert_eq!(read("7/"), Some((7, 0)));
+        assert_eq!(read("7//"), Some((7, 0)));
+        assert_eq!(read("7/8/"), Some((7, 8)));
+        assert_eq!(read("99999999999999999999999"), Some((i64::MAX, 0)));
+        for text in ["", "0", "7/0", "a", "7/a", "7/8/a", "7/8/9/1", "1.5", "/1", "--1"] {
+            assert_eq!(read(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn words_are_split_at_any_white_space() {
+        let mut rest: &[u8] = b" \tf  1/2\t3 ";
+        assert_eq!(word(&mut rest), Some(&b"f"[..]));
+        assert_eq!(word(&mut rest), Some(&b"1/2"[..]));
+        assert_eq!(word(&mut rest), Some(&b"3"[..]));
+        assert_eq!(word(&mut rest), None);
+    }
+}
