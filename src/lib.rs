@@ -8,5 +8,6 @@
 pub mod error;
 pub mod format;
 pub mod mesh;
+pub mod report;
 
 pub use error::{Error, Result};
