@@ -10,5 +10,6 @@ pub mod error;
 pub mod format;
 pub mod import;
 pub mod mesh;
+pub mod report;
 
 pub use error::{Error, Result};

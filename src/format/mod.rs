@@ -1,5 +1,58 @@
 //! What stands in `out/`: the whole contract between the build side and the run side.
+//!
+//! ```text
+//! out/scene.hlod      the hierarchy: Scene
+//! out/nodes/*.glb     one file per node: NodeMesh
+//! out/textures/*      repeating pictures that many nodes share
+//! out/build.json      what the build did, for people and scripts
+//! ```
 
+mod bytes;
+mod file_name;
+mod glb_read;
+mod glb_schema;
+#[cfg(test)]
+mod glb_tests;
+mod glb_write;
 mod node_mesh;
+mod output_dir;
+#[cfg(test)]
+mod output_dir_tests;
+mod scene;
+mod scene_check;
+mod scene_read;
+#[cfg(test)]
+mod scene_tests;
+mod scene_write;
+#[cfg(test)]
+mod test_mesh;
+#[cfg(test)]
+pub(crate) mod test_scene;
 
+pub use file_name::is_plain_file_name;
+pub use glb_read::read_glb;
+pub use glb_write::{NodeLabel, write_glb};
 pub use node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
+pub use output_dir::{OutputDir, check_apart};
+pub use scene::{BlockInfo, Children, Node, Scene, SharedTexture};
+pub use scene_check::{Element, SceneDefect};
+
+/// The scene description inside an output folder.
+pub const SCENE_FILE: &str = "scene.hlod";
+/// The folder of node files inside an output folder.
+pub const NODES_DIR: &str = "nodes";
+/// The folder of shared pictures inside an output folder.
+pub const TEXTURES_DIR: &str = "textures";
+/// The report of the build inside an output folder.
+pub const REPORT_FILE: &str = "build.json";
+
+/// The first bytes of every scene file, whatever its version. The last one stops programs that
+/// take it for text.
+pub const SCENE_MAGIC: [u8; 8] = *b"HLODSCN\x1a";
+/// The version of the scene file that this crate writes, and the only one that it reads.
+pub const SCENE_VERSION: u32 = 1;
+
+/// CRC-32 (ISO-HDLC, as in zip and PNG) of a node's file, as [`Node::file_crc`] keeps it.
+pub fn file_crc(bytes: &[u8]) -> u32 {
+    crc32fast::hash(bytes)
+}

@@ -1,0 +1,246 @@
+//! Node files: round trip, what other readers see, and damage.
+
+use std::path::Path;
+
+use super::glb_write::{NodeLabel, write_glb};
+use super::node_mesh::{NodeImageData, NodeMesh, Primitive};
+use super::test_mesh::mesh;
+use super::{glb_read::read_glb, glb_schema};
+use crate::mesh::{AlphaMode, UpAxis, Wrap};
+
+const LABEL: NodeLabel = NodeLabel { id: u64::MAX, level: 2, block: Some(7) };
+
+fn write(mesh: &NodeMesh, up: UpAxis) -> Vec<u8> {
+    write_glb(mesh, up, LABEL).unwrap()
+}
+
+fn read(bytes: &[u8]) -> crate::Result<NodeMesh> {
+    read_glb(bytes, Path::new("out/nodes/n.glb"))
+}
+
+/// `==` takes −0 for 0; bits do not.
+fn bits(mesh: &NodeMesh) -> Vec<u32> {
+    let flat = |p: &Primitive| {
+        let floats = p.positions.as_flattened().iter().chain(p.texcoords.as_flattened());
+        floats.map(|v| v.to_bits()).collect::<Vec<_>>()
+    };
+    mesh.primitives.iter().flat_map(flat).collect()
+}
+
+#[test]
+fn reads_back_what_it_wrote_bit_for_bit() {
+    for up in [UpAxis::Y, UpAxis::Z] {
+        let mesh = mesh();
+        let bytes = write(&mesh, up);
+        assert_eq!(bytes.len() % 4, 0);
+        let back = read(&bytes).unwrap();
+        assert_eq!(back, mesh);
+        assert_eq!(bits(&back), bits(&mesh));
+        assert_eq!(write(&mesh, up), bytes);
+    }
+}
+
+#[test]
+fn a_node_without_geometry_is_a_file() {
+    let empty = NodeMesh { origin: [1.0, 2.0, 3.0], images: vec![], primitives: vec![] };
+    let bytes = write(&empty, UpAxis::Z);
+    gltf::Gltf::from_slice(&bytes).unwrap();
+    assert_eq!(read(&bytes).unwrap(), empty);
+}
+
+#[test]
+fn indices_take_two_bytes_while_they_fit() {
+    for (vertices, kind) in
+        [(0xFFFF, glb_schema::UNSIGNED_SHORT), (0x1_0000, glb_schema::UNSIGNED_INT)]
+    {
+        let mut mesh = mesh();
+        mesh.images.clear();
+        mesh.primitives.drain(..3);
+        mesh.primitives[0].positions = (0..vertices).map(|i| [i as f32, 0.5, 0.0]).collect();
+        mesh.primitives[0].indices = vec![0, 1, vertices as u32 - 1];
+        let bytes = write(&mesh, UpAxis::Y);
+        assert_eq!(read(&bytes).unwrap(), mesh);
+        let document = gltf::Gltf::from_slice(&bytes).unwrap();
+        let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
+        assert_eq!(primitive.indices().unwrap().data_type().as_gl_enum(), kind);
+    }
+}
+
+/// Another reader sees the same vertices at the same place, Y up.
+#[test]
+fn other_readers_see_the_city_upright() {
+    let mesh = mesh();
+    for up in [UpAxis::Y, UpAxis::Z] {
+        let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(&write(&mesh, up)).unwrap();
+        let blob = blob.unwrap();
+        let node = document.default_scene().unwrap().nodes().next().unwrap();
+        let matrix = glam::Mat4::from_cols_array_2d(&node.transform().matrix()).as_dmat4();
+        let first = node.mesh().unwrap().primitives().next().unwrap();
+        let read = first.reader(|_| Some(&blob));
+        let positions = read.read_positions().unwrap();
+        for (seen, ours) in positions.zip(&mesh.primitives[0].positions) {
+            let seen = matrix.transform_point3(glam::Vec3::from(seen).as_dvec3());
+            let source = glam::Vec3::from(*ours).as_dvec3() + glam::DVec3::from(mesh.origin);
+            let expected = match up {
+                UpAxis::Y => source,
+                UpAxis::Z => glam::DVec3::new(source.x, source.z, -source.y),
+            };
+            assert_eq!(seen, expected);
+        }
+    }
+}
+
+#[test]
+fn other_readers_see_the_same_surfaces() {
+    let bytes = write(&mesh(), UpAxis::Z);
+    let document = gltf::Gltf::from_slice(&bytes).unwrap().document;
+    assert_eq!(document.materials().count(), 3, "equal surfaces share a material");
+    let primitives: Vec<_> = document.meshes().next().unwrap().primitives().collect();
+    let material = |index: usize| primitives[index].material();
+    assert!(material(0).unlit() && material(1).unlit() && !material(2).unlit());
+    assert!(!material(0).double_sided() && material(2).double_sided());
+    assert_eq!(material(1).alpha_mode(), gltf::material::AlphaMode::Mask);
+    assert_eq!(material(1).alpha_cutoff(), Some(0.1));
+    assert_eq!(material(2).index(), material(3).index());
+    let texture = material(1).pbr_metallic_roughness().base_color_texture().unwrap().texture();
+    assert_eq!(texture.sampler().wrap_t(), gltf::texture::WrappingMode::MirroredRepeat);
+    assert!(matches!(
+        texture.source().source(),
+        gltf::image::Source::Uri { uri: "../textures/fence-64.png", .. }
+    ));
+    let colors = primitives[1].get(&gltf::Semantic::Colors(0)).unwrap();
+    assert!(colors.normalized());
+}
+
+#[test]
+fn what_breaks_a_promise_is_not_written() {
+    let cases: &[(&str, fn(&mut NodeMesh))] = &[
+        ("fit in 32 bits", |m| m.origin[0] = 0.1),
+        ("fit in 32 bits", |m| m.origin[0] = f64::NAN),
+        ("finite", |m| m.primitives[0].positions[1][2] = f32::NAN),
+        ("finite", |m| m.primitives[0].texcoords[1][1] = f32::INFINITY),
+        ("texture coordinates: expected 4", |m| drop(m.primitives[1].texcoords.pop())),
+        ("found none", |m| m.primitives[1].texcoords.clear()),
+        ("colours: expected 4", |m| drop(m.primitives[2].colors.pop())),
+        ("indices below 4, found 4", |m| m.primitives[0].indices[0] = 4),
+        ("whole triangles", |m| drop(m.primitives[0].indices.pop())),
+        ("whole triangles", |m| m.primitives[0].indices.clear()),
+        ("colour within", |m| m.primitives[0].surface.base_color[1] = 1.5),
+        ("cutoff", |m| m.primitives[0].surface.alpha = AlphaMode::Mask { cutoff: f32::NAN }),
+        ("image below 2", |m| m.primitives[0].surface.image = Some(2)),
+        ("plain file name", |m| {
+            m.images[0].data = NodeImageData::Shared { file_name: "../x.png".into() };
+        }),
+        ("JPEG or PNG", |m| {
+            m.images[0].data = NodeImageData::Embedded { mime: "image/bmp", bytes: vec![1] };
+        }),
+    ];
+    for (words, spoil) in cases {
+        let mut mesh = mesh();
+        spoil(&mut mesh);
+        let message = write_glb(&mesh, UpAxis::Y, LABEL).unwrap_err().to_string();
+        assert!(message.contains(words), "{words}: {message}");
+    }
+}
+
+/// The wrapping of a surface without a picture means nothing, and is not kept.
+#[test]
+fn wrapping_without_a_picture_is_not_kept() {
+    let mut mesh = mesh();
+    mesh.primitives[2].surface.wrap = [Wrap::Clamp; 2];
+    let bytes = write(&mesh, UpAxis::Y);
+    assert_eq!(gltf::Gltf::from_slice(&bytes).unwrap().materials().count(), 3);
+    mesh.primitives[2].surface.wrap = [Wrap::Repeat; 2];
+    assert_eq!(read(&bytes).unwrap(), mesh);
+}
+
+#[test]
+fn every_truncation_is_an_error() {
+    let bytes = write(&mesh(), UpAxis::Z);
+    for length in 0..bytes.len() {
+        assert!(read(&bytes[..length]).is_err(), "{length}");
+        if length >= 12 {
+            let mut sealed = bytes[..length].to_vec();
+            sealed[8..12].copy_from_slice(&(length as u32).to_le_bytes());
+            assert!(read(&sealed).is_err(), "{length} with its length corrected");
+        }
+    }
+}
+
+/// What is accepted in spite of a flipped bit can be written, so it keeps every promise.
+#[test]
+fn a_flipped_bit_is_an_error_or_another_sound_mesh() {
+    let bytes = write(&mesh(), UpAxis::Z);
+    let mut refused = 0;
+    for bit in 0..bytes.len() * 8 {
+        let mut flipped = bytes.clone();
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        match read(&flipped) {
+            Ok(mesh) => drop(write_glb(&mesh, UpAxis::Z, LABEL).unwrap()),
+            Err(error) => {
+                assert!(error.to_string().starts_with("out/nodes/n.glb: not a node file: "));
+                refused += 1;
+            }
+        }
+    }
+    assert!(refused > bytes.len() * 4, "{refused} of {} bits", bytes.len() * 8);
+}
+
+/// Replaces a piece of the JSON by another, and puts lengths right.
+fn edit(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let json = std::str::from_utf8(&bytes[20..20 + length]).unwrap();
+    assert!(json.contains(from), "{from} not in {json}");
+    let json = json.replacen(from, to, 1);
+    let mut out = bytes[..20].to_vec();
+    out[12..16].copy_from_slice(&(json.len() as u32).to_le_bytes());
+    out.extend(json.as_bytes());
+    out.extend(&bytes[20 + length..]);
+    let length = out.len() as u32;
+    out[8..12].copy_from_slice(&length.to_le_bytes());
+    out
+}
+
+#[test]
+fn lies_in_the_json_are_refused() {
+    let bytes = write(&mesh(), UpAxis::Z);
+    let cases = [
+        ("\"count\":4,", "\"count\":4000000000,", "expected 4000000000 elements"),
+        ("\"count\":4,", "\"count\":3,", "expected 3 elements"),
+        ("\"byteLength\":48,", "\"byteLength\":18446744073709551615,", "within buffer 0"),
+        ("\"byteOffset\":0,", "\"byteOffset\":18446744073709551615,", "within buffer 0"),
+        ("\"buffer\":0,", "\"buffer\":1,", "buffer 1"),
+        ("{\"bufferView\":1,", "{\"bufferView\":0,", "used twice"),
+        ("{\"bufferView\":1,", "{\"bufferView\":99,", "found 99"),
+        ("\"POSITION\":0", "\"POSITION\":77", "found 77"),
+        ("\"POSITION\":0", "\"POSITION\":1", "expected Vec3"),
+        ("\"material\":0", "\"material\":9", "found 9"),
+        ("\"sampler\":0", "\"sampler\":9", "found 9"),
+        ("\"source\":0", "\"source\":9", "found 9"),
+        ("\"mesh\":0", "\"mesh\":1", "mesh Some(1) of 1"),
+        ("../textures/", "../../etc/", "expected ../textures/NAME"),
+        ("../textures/", "../textures/../", "expected ../textures/NAME"),
+        ("\"image/png\"", "\"image/gif\"", "found image/gif"),
+        ("\"matrix\":[1.0", "\"matrix\":[2.0", "a matrix that turns"),
+        ("\"MASK\"", "\"BLEND\"", "do not agree"),
+        ("\"version\":\"2.0\"", "\"version\":\"3.0\"", "found 3.0"),
+        ("\"scene\":0", "\"scene\":0,\"cameras\":[]", "unknown field `cameras`"),
+        ("\"meshes\":", "\"animations\":", "unknown field `animations`"),
+    ];
+    for (from, to, words) in cases {
+        let message = read(&edit(&bytes, from, to)).unwrap_err().to_string();
+        assert!(message.contains(words), "{to}: expected {words:?}, found {message}");
+    }
+}
+
+#[test]
+fn an_index_past_the_vertices_is_refused() {
+    let mut mesh = mesh();
+    mesh.images.clear();
+    mesh.primitives.drain(..3);
+    let mut bytes = write(&mesh, UpAxis::Y);
+    let at = bytes.len() - 8; // 2 1 0 as u16, and two bytes of padding
+    assert_eq!(bytes[at..], [2, 0, 1, 0, 0, 0, 0, 0]);
+    bytes[at] = 3;
+    assert!(read(&bytes).unwrap_err().to_string().contains("expected below 3, found 3"));
+}

@@ -1,0 +1,329 @@
+//! Writes a node as GLB, the binary form of glTF 2.0.
+
+use super::TEXTURES_DIR;
+use super::file_name::is_plain_file_name;
+use super::glb_schema::{self as schema, *};
+use super::node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
+use crate::mesh::{AlphaMode, UpAxis, Wrap};
+use crate::{Error, Result};
+
+/// Where a node stands in its scene; goes into the file for people and tools.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NodeLabel {
+    /// [`Node::id`](super::Node::id).
+    pub id: u64,
+    /// [`Node::level`](super::Node::level).
+    pub level: u32,
+    /// [`Node::block`](super::Node::block).
+    pub block: Option<u32>,
+}
+
+/// The bytes of a node's file. They depend on the arguments and this crate's version alone.
+///
+/// glTF is Y up: where `up` is Z the node's transform turns it, and the vertices stay in source
+/// axes. Surfaces with a picture are unlit, since photographs hold their light; others are lit,
+/// flat for want of normals. The wrapping of a surface without a picture is not kept. A mesh
+/// without primitives is a file without geometry.
+///
+/// Fails where the mesh breaks its own promises: arrays of different lengths, indices out of
+/// range, numbers that are not finite, an origin that does not fit in f32.
+pub fn write_glb(mesh: &NodeMesh, up: UpAxis, label: NodeLabel) -> Result<Vec<u8>> {
+    let mut writer = Writer {
+        root: Root {
+            asset: Asset {
+                version: "2.0".into(),
+                generator: concat!("hlod ", env!("CARGO_PKG_VERSION")).into(),
+            },
+            extensions_used: Vec::new(),
+            scene: 0,
+            scenes: vec![SceneRoots { nodes: vec![0] }],
+            nodes: vec![placement(mesh, up, label)?],
+            meshes: Vec::new(),
+            materials: Vec::new(),
+            textures: Vec::new(),
+            samplers: Vec::new(),
+            images: Vec::new(),
+            accessors: Vec::new(),
+            buffer_views: Vec::new(),
+            buffers: Vec::new(),
+        },
+        bin: Vec::with_capacity(bin_size(mesh)),
+    };
+    let mut primitives = Vec::with_capacity(mesh.primitives.len());
+    for (primitive, number) in mesh.primitives.iter().zip(0..) {
+        check(primitive, mesh.images.len())
+            .map_err(|what| broken(format!("primitive {number}: {what}")))?;
+        primitives.push(writer.primitive(primitive));
+    }
+    if !primitives.is_empty() {
+        writer.root.meshes.push(schema::Mesh { primitives });
+    }
+    for (image, number) in mesh.images.iter().zip(0..) {
+        writer.image(image).map_err(|what| broken(format!("image {number}: {what}")))?;
+    }
+    writer.finish()
+}
+
+fn broken(what: impl std::fmt::Display) -> Error {
+    Error::Internal(format!("node mesh: {what}"))
+}
+
+/// Bytes of geometry and pictures, near enough to allocate once.
+fn bin_size(mesh: &NodeMesh) -> usize {
+    let geometry: usize = mesh
+        .primitives
+        .iter()
+        .map(|p| {
+            12 * p.positions.len() + 8 * (p.texcoords.len() + p.colors.len()) + 4 * p.indices.len()
+        })
+        .sum();
+    let pictures: usize = mesh
+        .images
+        .iter()
+        .map(|image| match &image.data {
+            NodeImageData::Embedded { bytes, .. } => bytes.len() + 4,
+            NodeImageData::Shared { .. } => 0,
+        })
+        .sum();
+    geometry + pictures
+}
+
+fn placement(mesh: &NodeMesh, up: UpAxis, label: NodeLabel) -> Result<Placement> {
+    let origin = mesh.origin.map(|coordinate| coordinate as f32);
+    if mesh.origin.iter().zip(origin).any(|(&exact, single)| f64::from(single) != exact) {
+        return Err(broken(format!("origin {:?}: expected to fit in 32 bits", mesh.origin)));
+    }
+    let [x, y, z] = origin;
+    let (translation, matrix) = match up {
+        UpAxis::Y => (Some(origin), None),
+        UpAxis::Z => {
+            let mut matrix = [0.0; 16];
+            matrix[..12].copy_from_slice(&Z_UP);
+            matrix[12..].copy_from_slice(&[x, z, -y, 1.0]);
+            (None, Some(matrix))
+        }
+    };
+    let NodeLabel { id, level, block } = label;
+    Ok(Placement {
+        mesh: (!mesh.primitives.is_empty()).then_some(0),
+        translation,
+        matrix,
+        extras: Extras { id, level, block },
+    })
+}
+
+/// What glTF and [`NodeMesh`] demand of a primitive.
+fn check(primitive: &Primitive, images: usize) -> Result<(), String> {
+    let Primitive { positions, texcoords, colors, indices, surface } = primitive;
+    let vertices = positions.len();
+    if vertices == 0 || indices.is_empty() || indices.len() % 3 != 0 {
+        return Err(format!("expected whole triangles, found {} corners", indices.len()));
+    }
+    for (name, length) in [("texture coordinates", texcoords.len()), ("colours", colors.len())] {
+        if length != 0 && length != vertices {
+            return Err(format!("{name}: expected {vertices} or none, found {length}"));
+        }
+    }
+    if let Some(&found) = indices.iter().find(|&&index| index as usize >= vertices) {
+        return Err(format!("expected indices below {vertices}, found {found}"));
+    }
+    if !positions.as_flattened().iter().chain(texcoords.as_flattened()).all(|v| v.is_finite()) {
+        return Err("expected finite coordinates".into());
+    }
+    if !surface.base_color.iter().all(|channel| (0.0..=1.0).contains(channel)) {
+        return Err(format!("expected a colour within 0–1, found {:?}", surface.base_color));
+    }
+    if let AlphaMode::Mask { cutoff } = surface.alpha
+        && !(0.0..=1.0).contains(&cutoff)
+    {
+        return Err(format!("expected an alpha cutoff within 0–1, found {cutoff}"));
+    }
+    match surface.image {
+        Some(image) if image >= images => {
+            Err(format!("expected an image below {images}, found {image}"))
+        }
+        Some(_) if texcoords.is_empty() => Err("expected texture coordinates, found none".into()),
+        _ => Ok(()),
+    }
+}
+
+struct Writer {
+    root: Root,
+    bin: Vec<u8>,
+}
+
+impl Writer {
+    fn primitive(&mut self, primitive: &Primitive) -> schema::Primitive {
+        let Primitive { positions, texcoords, colors, indices, surface } = primitive;
+        let position = self.accessor(positions.len(), FLOAT, Shape::Vec3, |bin| {
+            positions.as_flattened().iter().for_each(|v| bin.extend_from_slice(&v.to_le_bytes()));
+        });
+        let (min, max) = positions.iter().fold(
+            ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]),
+            |(min, max): ([f32; 3], [f32; 3]), p| {
+                (
+                    std::array::from_fn(|axis| min[axis].min(p[axis])),
+                    std::array::from_fn(|axis| max[axis].max(p[axis])),
+                )
+            },
+        );
+        self.root.accessors[position].min = Some(min);
+        self.root.accessors[position].max = Some(max);
+        let texcoord = (!texcoords.is_empty()).then(|| {
+            self.accessor(texcoords.len(), FLOAT, Shape::Vec2, |bin| {
+                let flat = texcoords.as_flattened();
+                flat.iter().for_each(|v| bin.extend_from_slice(&v.to_le_bytes()));
+            })
+        });
+        let color = (!colors.is_empty()).then(|| {
+            let accessor = self.accessor(colors.len(), UNSIGNED_SHORT, Shape::Vec4, |bin| {
+                let flat = colors.as_flattened();
+                flat.iter().for_each(|v| bin.extend_from_slice(&v.to_le_bytes()));
+            });
+            self.root.accessors[accessor].normalized = true;
+            accessor
+        });
+        let short = positions.len() <= MOST_SHORT_VERTICES;
+        let component = if short { UNSIGNED_SHORT } else { UNSIGNED_INT };
+        let indices = self.accessor(indices.len(), component, Shape::Scalar, |bin| {
+            for index in indices {
+                let bytes = index.to_le_bytes();
+                bin.extend_from_slice(if short { &bytes[..2] } else { &bytes });
+            }
+        });
+        let material = self.material(surface);
+        schema::Primitive {
+            attributes: Attributes { position, texcoord, color },
+            indices,
+            material,
+        }
+    }
+
+    /// Adds an accessor with a buffer view of its own.
+    fn accessor(
+        &mut self,
+        count: usize,
+        component_type: u32,
+        shape: Shape,
+        fill: impl FnOnce(&mut Vec<u8>),
+    ) -> usize {
+        let target = if shape == Shape::Scalar { ELEMENT_ARRAY_BUFFER } else { ARRAY_BUFFER };
+        let buffer_view = self.view(Some(target), fill);
+        self.root.accessors.push(Accessor {
+            buffer_view,
+            component_type,
+            normalized: false,
+            count,
+            shape,
+            min: None,
+            max: None,
+        });
+        self.root.accessors.len() - 1
+    }
+
+    fn view(&mut self, target: Option<u32>, fill: impl FnOnce(&mut Vec<u8>)) -> usize {
+        pad(&mut self.bin, 0);
+        let byte_offset = self.bin.len();
+        fill(&mut self.bin);
+        let byte_length = self.bin.len() - byte_offset;
+        self.root.buffer_views.push(BufferView { buffer: 0, byte_offset, byte_length, target });
+        self.root.buffer_views.len() - 1
+    }
+
+    /// The material of a surface: one for all that look alike.
+    fn material(&mut self, surface: &Surface) -> usize {
+        let base_color_texture =
+            surface.image.map(|image| TextureInfo { index: self.texture(image, surface.wrap) });
+        if base_color_texture.is_some() && self.root.extensions_used.is_empty() {
+            self.root.extensions_used.push(UNLIT.into());
+        }
+        let (alpha_mode, alpha_cutoff) = match surface.alpha {
+            AlphaMode::Opaque => (None, None),
+            AlphaMode::Mask { cutoff } => (Some(schema::AlphaMode::Mask), Some(cutoff)),
+            AlphaMode::Blend => (Some(schema::AlphaMode::Blend), None),
+        };
+        let material = schema::Material {
+            extensions: surface.image.map(|_| MaterialExtensions { unlit: Unlit {} }),
+            pbr_metallic_roughness: Pbr {
+                base_color_factor: surface.base_color,
+                base_color_texture,
+                metallic_factor: 0.0,
+                roughness_factor: 1.0,
+            },
+            alpha_mode,
+            alpha_cutoff,
+            double_sided: surface.double_sided,
+        };
+        find_or_push(&mut self.root.materials, material)
+    }
+
+    fn texture(&mut self, source: usize, wrap: [Wrap; 2]) -> usize {
+        let [wrap_s, wrap_t] = wrap.map(|wrap| match wrap {
+            Wrap::Repeat => REPEAT,
+            Wrap::Mirror => MIRRORED_REPEAT,
+            Wrap::Clamp => CLAMP_TO_EDGE,
+        });
+        let sampler =
+            Sampler { mag_filter: LINEAR, min_filter: LINEAR_MIPMAP_LINEAR, wrap_s, wrap_t };
+        let sampler = find_or_push(&mut self.root.samplers, sampler);
+        find_or_push(&mut self.root.textures, Texture { sampler, source })
+    }
+
+    fn image(&mut self, image: &NodeImage) -> Result<(), String> {
+        let (buffer_view, mime_type, uri) = match &image.data {
+            NodeImageData::Embedded { mime, bytes } => {
+                if !["image/jpeg", "image/png"].contains(mime) || bytes.is_empty() {
+                    return Err(format!("expected JPEG or PNG, found {mime}"));
+                }
+                let view = self.view(None, |bin| bin.extend_from_slice(bytes));
+                (Some(view), Some((*mime).to_owned()), None)
+            }
+            NodeImageData::Shared { file_name } => {
+                if !is_plain_file_name(file_name) {
+                    return Err(format!("expected a plain file name, found {file_name:?}"));
+                }
+                (None, None, Some(format!("../{TEXTURES_DIR}/{file_name}")))
+            }
+        };
+        let extras = ImageSize { width: image.width, height: image.height };
+        self.root.images.push(Image { buffer_view, mime_type, uri, extras });
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<Vec<u8>> {
+        if !self.bin.is_empty() {
+            self.root.buffers.push(Buffer { byte_length: self.bin.len() });
+        }
+        pad(&mut self.bin, 0);
+        let mut json = serde_json::to_vec(&self.root).map_err(broken)?;
+        pad(&mut json, b' ');
+        let bin_chunk = if self.bin.is_empty() { 0 } else { 8 + self.bin.len() };
+        let length = 12 + 8 + json.len() + bin_chunk;
+        let too_long = |_| broken(format!("{length} bytes, and GLB ends at 4 GiB"));
+        let mut out = Vec::with_capacity(length);
+        for word in [MAGIC, 2, u32::try_from(length).map_err(too_long)?] {
+            out.extend_from_slice(&word.to_le_bytes());
+        }
+        let mut chunk = |kind: u32, bytes: &[u8]| {
+            out.extend_from_slice(&(bytes.len() as u32).to_le_bytes());
+            out.extend_from_slice(&kind.to_le_bytes());
+            out.extend_from_slice(bytes);
+        };
+        chunk(CHUNK_JSON, &json);
+        if !self.bin.is_empty() {
+            chunk(CHUNK_BIN, &self.bin);
+        }
+        Ok(out)
+    }
+}
+
+fn pad(bytes: &mut Vec<u8>, with: u8) {
+    bytes.resize(bytes.len().next_multiple_of(4), with);
+}
+
+fn find_or_push<T: PartialEq>(list: &mut Vec<T>, item: T) -> usize {
+    list.iter().position(|known| *known == item).unwrap_or_else(|| {
+        list.push(item);
+        list.len() - 1
+    })
+}

@@ -1,0 +1,133 @@
+//! Writes `scene.hlod`.
+//!
+//! All little-endian; a text is its length in bytes as u32 and then UTF-8; an absent index is
+//! `u32::MAX`.
+//!
+//! ```text
+//! magic [u8; 8] · version u32 · flags u32 (1: textured, 2: Z is up) · file length u64
+//! fingerprint [u8; 32] · bounding box min and max [f64; 6] · roots u32
+//! parameters text (JSON)
+//! count u32 · shared textures: file name text · width u32 · height u32 · bytes u64
+//! count u32 · blocks: name text · input text · origin [f64; 3]
+//! count u32 · nodes: id u64 · parent, first child, next sibling u32 · level u32 · block u32
+//!             triangles, textured triangles u32 · bounding box min and max [f64; 6]
+//!             cost, static benefit, geometric error f64 · average normal [f32; 3]
+//!             texels, shared texels u64 · origin [f64; 3] · file name text · file bytes u64
+//!             file CRC-32 u32 · count u32 · indices of shared textures u32
+//! CRC-32 u32 of all that precedes
+//! ```
+
+use super::scene::{Node, Scene};
+use super::{SCENE_MAGIC, SCENE_VERSION};
+use crate::mesh::UpAxis;
+use crate::{Error, Result};
+
+/// Set where any triangle has a picture.
+pub(super) const FLAG_TEXTURED: u32 = 1;
+/// Set where Z is up, clear where Y is.
+pub(super) const FLAG_Z_UP: u32 = 2;
+/// Stands for an absent index.
+pub(super) const NONE: u32 = u32::MAX;
+/// Where the length of the file stands.
+const LENGTH_AT: usize = 16;
+
+impl Scene {
+    /// The bytes of `scene.hlod`.
+    ///
+    /// Fails where [`Scene::check`] finds a defect: what is written can be read.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let defects = self.check();
+        let (Some([min, max]), true) = (self.bounds(), defects.is_empty()) else {
+            let first = defects.first().map(ToString::to_string).unwrap_or_default();
+            return Err(Error::Internal(format!("unsound scene: {first}")));
+        };
+        let mut out = Sink(Vec::with_capacity(256 + 256 * self.nodes.len()));
+        out.0.extend(SCENE_MAGIC);
+        out.u32(SCENE_VERSION);
+        let textured = if self.is_textured() { FLAG_TEXTURED } else { 0 };
+        let z_up = if self.up == UpAxis::Z { FLAG_Z_UP } else { 0 };
+        out.u32(textured | z_up);
+        out.u64(0); // the length, once it is known
+        out.0.extend(self.fingerprint);
+        out.f64s(&min);
+        out.f64s(&max);
+        out.count(self.roots().count())?;
+        out.text(&self.parameters.to_string())?;
+        out.count(self.shared_textures.len())?;
+        for texture in &self.shared_textures {
+            out.text(&texture.file_name)?;
+            out.u32(texture.width);
+            out.u32(texture.height);
+            out.u64(texture.bytes);
+        }
+        out.count(self.blocks.len())?;
+        for block in &self.blocks {
+            out.text(&block.name)?;
+            out.text(&block.input)?;
+            out.f64s(&block.origin);
+        }
+        out.count(self.nodes.len())?;
+        for node in &self.nodes {
+            out.node(node)?;
+        }
+        let mut bytes = out.0;
+        let length = bytes.len() as u64 + 4;
+        bytes[LENGTH_AT..LENGTH_AT + 8].copy_from_slice(&length.to_le_bytes());
+        bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+        Ok(bytes)
+    }
+}
+
+struct Sink(Vec<u8>);
+
+impl Sink {
+    fn u32(&mut self, value: u32) {
+        self.0.extend(value.to_le_bytes());
+    }
+
+    fn u64(&mut self, value: u64) {
+        self.0.extend(value.to_le_bytes());
+    }
+
+    fn f64s(&mut self, values: &[f64]) {
+        values.iter().for_each(|value| self.0.extend(value.to_le_bytes()));
+    }
+
+    fn count(&mut self, count: usize) -> Result<()> {
+        match u32::try_from(count) {
+            Ok(count) if count != NONE => self.u32(count),
+            _ => return Err(Error::Internal(format!("{count} entries in one table of a scene"))),
+        }
+        Ok(())
+    }
+
+    fn text(&mut self, text: &str) -> Result<()> {
+        self.count(text.len())?;
+        self.0.extend(text.as_bytes());
+        Ok(())
+    }
+
+    fn node(&mut self, node: &Node) -> Result<()> {
+        self.u64(node.id);
+        for link in [node.parent, node.first_child, node.next_sibling] {
+            self.u32(link.unwrap_or(NONE));
+        }
+        self.u32(node.level);
+        self.u32(node.block.unwrap_or(NONE));
+        self.u32(node.triangles);
+        self.u32(node.textured_triangles);
+        self.f64s(&node.bbox_min);
+        self.f64s(&node.bbox_max);
+        self.f64s(&[node.cost, node.static_benefit, node.geometric_error]);
+        node.average_normal.iter().for_each(|value| self.0.extend(value.to_le_bytes()));
+        self.u64(node.texels);
+        self.u64(node.shared_texels);
+        self.f64s(&node.origin);
+        self.text(&node.file)?;
+        self.u64(node.file_bytes);
+        self.u32(node.file_crc);
+        self.count(node.shared_textures.len())?;
+        node.shared_textures.iter().for_each(|&texture| self.u32(texture));
+        Ok(())
+    }
+}

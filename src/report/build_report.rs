@@ -1,0 +1,149 @@
+//! `build.json`: how a result was made and what it is made of.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Result};
+
+/// The contents of `build.json`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BuildReport {
+    /// Version of the program that built it.
+    pub version: String,
+    /// What it was asked for; the same as [`Scene::parameters`](crate::format::Scene).
+    pub parameters: serde_json::Value,
+    /// What it was built from, in the order of the command line.
+    pub inputs: Vec<InputReport>,
+    /// Triangles of all inputs after import.
+    pub source_triangles: u64,
+    /// One entry a level, the roots' first.
+    pub levels: Vec<LevelReport>,
+    /// Stages in the order in which they began.
+    pub stages: Vec<StageReport>,
+    /// Wall time of the whole, in seconds.
+    pub seconds: f64,
+    /// Most memory that the process held at any time; 0 where the system does not say.
+    pub peak_memory_bytes: u64,
+    /// How often each reason or step of the ladder occurred, most frequent first.
+    pub outcomes: Vec<Count>,
+    /// Nodes that have more triangles than their budget allows, in order of id.
+    pub over_budget: Vec<OverBudget>,
+    /// What was imperfect and how often, in the order in which it was met.
+    pub warnings: Vec<Count>,
+}
+
+/// An input of the command line.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputReport {
+    /// As given, or as found in a given folder.
+    pub path: String,
+    /// All files that were read for it: the model, its materials, its pictures.
+    pub files: Vec<FileReport>,
+}
+
+/// A file that was read.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileReport {
+    /// Its path.
+    pub path: String,
+    /// Its size.
+    pub bytes: u64,
+    /// BLAKE3 of its contents, in hexadecimal.
+    pub blake3: String,
+}
+
+/// The nodes of one level.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LevelReport {
+    /// Steps from the root.
+    pub level: u32,
+    /// Number of nodes.
+    pub nodes: u64,
+    /// Triangles of all of them.
+    pub triangles: u64,
+    /// Triangles with a picture.
+    pub textured_triangles: u64,
+    /// Texels of pictures in the nodes' files.
+    pub texels: u64,
+    /// Bytes of the nodes' files.
+    pub bytes: u64,
+    /// Nodes that missed their budget.
+    pub over_budget: u64,
+}
+
+/// How long a stage took.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StageReport {
+    /// Its name.
+    pub stage: String,
+    /// Seconds of work, summed over the threads that did it.
+    pub seconds: f64,
+}
+
+/// A text and how often it applies.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Count {
+    /// What happened.
+    pub text: String,
+    /// How often.
+    pub count: u64,
+}
+
+/// A node that missed its budget.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OverBudget {
+    /// [`Node::id`](crate::format::Node).
+    pub id: u64,
+    /// [`Node::file`](crate::format::Node).
+    pub file: String,
+    /// Triangles that it should have at most.
+    pub budget: u64,
+    /// Triangles that it has.
+    pub triangles: u64,
+    /// Why.
+    pub reason: String,
+}
+
+impl BuildReport {
+    /// The contents of `build.json`, indented, with a line break at the end.
+    pub fn to_json(&self) -> Result<String> {
+        serde_json::to_string_pretty(self)
+            .map(|text| text + "\n")
+            .map_err(|error| Error::Internal(format!("build report: {error}")))
+    }
+}
+
+/// Sums up a scene by level; `over_budget` is left at 0 for the caller to fill in.
+pub fn level_reports(scene: &crate::format::Scene) -> Vec<LevelReport> {
+    let mut levels = vec![LevelReport::default(); scene.level_count()];
+    for (level, number) in levels.iter_mut().zip(0..) {
+        level.level = number;
+    }
+    for node in &scene.nodes {
+        let level = &mut levels[node.level as usize];
+        level.nodes += 1;
+        level.triangles += u64::from(node.triangles);
+        level.textured_triangles += u64::from(node.textured_triangles);
+        level.texels += node.texels;
+        level.bytes += node.file_bytes;
+    }
+    levels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_back_what_it_wrote() {
+        let report = BuildReport {
+            version: "1.2.3".into(),
+            parameters: serde_json::json!({ "level_factor": 4 }),
+            stages: vec![StageReport { stage: "import".into(), seconds: 0.1 + 0.2 }],
+            warnings: vec![Count { text: "a.mtl: not found".into(), count: 2 }],
+            ..BuildReport::default()
+        };
+        let text = report.to_json().unwrap();
+        assert!(text.ends_with("}\n"));
+        assert_eq!(serde_json::from_str::<BuildReport>(&text).unwrap(), report);
+    }
+}

@@ -1,0 +1,6 @@
+//! What a build tells people and programs: the hierarchy, and how it was made.
+
+pub mod build_report;
+pub mod inspect;
+
+pub use build_report::BuildReport;
