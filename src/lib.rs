@@ -8,5 +8,6 @@
 pub mod error;
 pub mod format;
 pub mod mesh;
+pub mod texture;
 
 pub use error::{Error, Result};
