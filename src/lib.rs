@@ -11,5 +11,6 @@ pub mod format;
 pub mod import;
 pub mod mesh;
 pub mod report;
+pub mod texture;
 
 pub use error::{Error, Result};

@@ -1,0 +1,270 @@
+//! The textures of one block: what its nodes copy their texels from.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::bits::BitGrid;
+use super::cache::{Decoded, TextureCache};
+use super::charts::{Charts, UvBox};
+use super::level::{self, LevelPicture, Region};
+use super::picture::Picture;
+use super::plan::{self, TextureUse};
+use super::raster::Rasterizer;
+use super::shared::SharedTextures;
+use crate::mesh::{Mesh, Model};
+
+/// What of the texture work can be chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TextureOptions {
+    /// JPEG quality, 1–100. From 90 on, colour is kept at full resolution. Default 85.
+    pub jpeg_quality: u8,
+    /// Longest side of an atlas, texels, 16–65535; default 4096. A leaf that needs more gets
+    /// several pages, a coarser node a coarser atlas and a warning.
+    pub max_atlas: u32,
+}
+
+impl Default for TextureOptions {
+    fn default() -> Self {
+        Self { jpeg_quality: 85, max_atlas: 4096 }
+    }
+}
+
+/// The textures of one block at all its levels.
+#[derive(Debug)]
+pub struct BlockTextures<'a> {
+    pub(super) model: &'a Model,
+    pub(super) shared: &'a SharedTextures,
+    pub(super) options: TextureOptions,
+    /// Source texels per texel along each axis, by level.
+    pub(super) steps: Vec<f64>,
+    /// By texture of the model.
+    pub(super) textures: Vec<Prepared>,
+    /// By material of the model.
+    pub(super) material_textures: Vec<Option<u32>>,
+    used_texels: u64,
+}
+
+/// One texture of a block.
+#[derive(Debug)]
+pub(super) enum Prepared {
+    /// Not used by the block, or not to be had.
+    Absent,
+    Atlas(AtlasSource),
+    Repeating(Arc<Decoded>),
+}
+
+/// A texture whose texels the nodes copy.
+#[derive(Debug)]
+pub(super) struct AtlasSource {
+    /// Of the whole picture.
+    pub size: [f64; 2],
+    /// First texel of the region.
+    pub origin: [f64; 2],
+    /// Along which axes charts cross the picture's border.
+    pub wraps: [bool; 2],
+    pub channels: usize,
+    /// By level.
+    pub levels: Vec<LevelPicture>,
+}
+
+impl AtlasSource {
+    /// The whole tiles by which a chart is moved so that it lies in the region.
+    pub fn tile(&self, chart: &UvBox, axis: usize) -> f64 {
+        if self.wraps[axis] {
+            (chart.min[axis] - self.origin[axis] / self.size[axis]).floor()
+        } else {
+            chart.tile(axis)
+        }
+    }
+}
+
+impl<'a> BlockTextures<'a> {
+    /// Decodes (or finds decoded) what the block's mesh uses and scales it for every level.
+    ///
+    /// `mesh` is the whole block at full detail; `simplifications` has each level's factor, the
+    /// root's first and 1 (the source) last.
+    pub fn prepare(
+        cache: &TextureCache<'a>,
+        shared: &'a SharedTextures,
+        mesh: &Mesh,
+        simplifications: &[f64],
+        options: TextureOptions,
+    ) -> Self {
+        let (model, plan) = (cache.model(), cache.plan());
+        let steps: Vec<f64> = simplifications
+            .iter()
+            .map(|factor| if factor.is_finite() { factor.max(1.0).sqrt() } else { 1.0 })
+            .collect();
+        let material_textures: Vec<Option<u32>> =
+            (0..model.materials.len() as u32).map(|material| plan.texture_of(material)).collect();
+        let mut used: Vec<u32> = mesh.materials.clone();
+        used.sort_unstable();
+        used.dedup();
+        let used = plan.textures_of(used);
+
+        let usage = Usage::find(mesh, &material_textures, plan.texture_count());
+        let prepared: Vec<(u32, Prepared, u64)> = used
+            .into_par_iter()
+            .map(|texture| {
+                let Some(decoded) = cache.take(texture) else {
+                    return (texture, Prepared::Absent, 0);
+                };
+                let whole = plan.texture_use(texture) == TextureUse::Repeating;
+                let found =
+                    if whole { None } else { usage.region(texture, &decoded.picture, mesh) };
+                let Some(Found { region, wraps, used_texels }) = found else {
+                    return (texture, Prepared::Repeating(decoded), 0);
+                };
+                let picture = &decoded.picture;
+                let source = AtlasSource {
+                    size: [f64::from(picture.width), f64::from(picture.height)],
+                    origin: region.origin.map(|start| start as f64),
+                    wraps,
+                    channels: usize::from(picture.channels),
+                    levels: level::level_pictures(picture, &region, &steps),
+                };
+                (texture, Prepared::Atlas(source), used_texels)
+            })
+            .collect();
+
+        let mut textures = Vec::new();
+        textures.resize_with(plan.texture_count(), || Prepared::Absent);
+        let mut used_texels = 0;
+        for (texture, prepared, texels) in prepared {
+            textures[texture as usize] = prepared;
+            used_texels += texels;
+        }
+        Self { model, shared, options, steps, textures, material_textures, used_texels }
+    }
+
+    /// The number of different source texels that the block's triangles use, of textures that are
+    /// cut up. Those of repeating ones are in [`SharedTextures::source_texels`].
+    pub fn used_texels(&self) -> u64 {
+        self.used_texels
+    }
+}
+
+/// The triangles and charts of each texture of a block.
+struct Usage {
+    charts: Charts,
+    /// By texture: its triangles.
+    triangles: Vec<Vec<[u32; 3]>>,
+}
+
+/// The part of a picture that a block uses.
+struct Found {
+    region: Region,
+    wraps: [bool; 2],
+    used_texels: u64,
+}
+
+/// A region of which this part is used is taken to be used wholly.
+const NEARLY_ALL: f64 = 0.995;
+
+impl Usage {
+    fn find(mesh: &Mesh, material_textures: &[Option<u32>], textures: usize) -> Self {
+        let mut triangles: Vec<Vec<[u32; 3]>> = vec![Vec::new(); textures];
+        if mesh.texcoords.len() != mesh.positions.len() {
+            return Self { charts: Charts::default(), triangles };
+        }
+        for triangle in &mesh.triangles {
+            let material = mesh.triangle_material(*triangle) as usize;
+            if let Some(texture) = material_textures.get(material).copied().flatten() {
+                triangles[texture as usize].push(*triangle);
+            }
+        }
+        let charts = Charts::find(&mesh.texcoords, triangles.iter().flatten().copied());
+        Self { charts, triangles }
+    }
+
+    /// The region of a texture, or `None` where charts are too long to be cut out of one picture.
+    fn region(&self, texture: u32, picture: &Picture, mesh: &Mesh) -> Option<Found> {
+        let triangles = &self.triangles[texture as usize];
+        let size = [picture.width as usize, picture.height as usize];
+        let mut charts: Vec<u32> =
+            triangles.iter().map(|t| self.charts.of_vertex[t[0] as usize]).collect();
+        charts.sort_unstable();
+        charts.dedup();
+        let boxes = || charts.iter().map(|chart| &self.charts.boxes[*chart as usize]);
+        if boxes().any(|chart| (0..2).any(|axis| chart.exceeds_tile(axis))) {
+            return None;
+        }
+        let wraps = [0, 1].map(|axis| boxes().any(|chart| chart.crosses_border(axis)));
+        let mut origin = [0i64; 2];
+        let mut region_size = [1usize; 2];
+        for axis in 0..2 {
+            let shifted = |chart: &UvBox| {
+                let tile = if wraps[axis] { chart.min[axis].floor() } else { chart.tile(axis) };
+                [chart.min[axis] - tile, chart.max[axis] - tile]
+            };
+            let low = boxes().map(|chart| shifted(chart)[0]).fold(f64::INFINITY, f64::min);
+            let high = boxes().map(|chart| shifted(chart)[1]).fold(f64::NEG_INFINITY, f64::max);
+            if low > high {
+                return Some(Found {
+                    region: Region { origin: [0; 2], size: [1; 2], covered: None },
+                    wraps,
+                    used_texels: 0,
+                });
+            }
+            let side = size[axis] as f64;
+            let (mut start, mut end) =
+                ((low * side - 1.5).floor() as i64 + 1, (high * side + 0.5).ceil() as i64);
+            if !wraps[axis] {
+                start = start.clamp(0, size[axis] as i64 - 1);
+                end = end.clamp(start + 1, size[axis] as i64);
+            }
+            origin[axis] = start;
+            region_size[axis] = (end - start).max(1) as usize;
+        }
+        let texels = (region_size[0] * region_size[1]) as u64;
+        let area: f64 = triangles.iter().map(|t| plan::uv_area(&mesh.texcoords, *t)).sum::<f64>()
+            * (size[0] * size[1]) as f64;
+        let inner = region_size.map(|side| side.saturating_sub(2).max(1) as f64);
+        let mut region = Region { origin, size: region_size, covered: None };
+        let mut used_texels = texels;
+        if area < NEARLY_ALL * inner[0] * inner[1] {
+            let covered = self.coverage(triangles, mesh, &region, size, wraps);
+            used_texels = covered.count();
+            if used_texels < texels {
+                region.covered = Some(covered);
+            }
+        }
+        Some(Found { region, wraps, used_texels })
+    }
+
+    /// The texels of the region that bilinear sampling of some triangle reads.
+    fn coverage(
+        &self,
+        triangles: &[[u32; 3]],
+        mesh: &Mesh,
+        region: &Region,
+        size: [usize; 2],
+        wraps: [bool; 2],
+    ) -> BitGrid {
+        let mut covered = BitGrid::new(region.size[0], region.size[1]);
+        let mut rasterizer = Rasterizer::default();
+        let size = size.map(|side| side as f64);
+        let origin = region.origin.map(|start| start as f64);
+        for triangle in triangles {
+            let chart = self.charts.of_vertex[triangle[0] as usize];
+            let chart = &self.charts.boxes[chart as usize];
+            let first = [0, 1]
+                .map(|axis| if wraps[axis] { chart.min[axis].floor() } else { chart.tile(axis) });
+            let corners = triangle.map(|vertex| {
+                let uv = super::charts::sane(mesh.texcoords[vertex as usize]);
+                [0, 1].map(|axis| (uv[axis] - first[axis]) * size[axis] - origin[axis])
+            });
+            // Where charts cross the border, a piece of one may be asked for a tile further on.
+            let tiles = wraps.map(|wraps| if wraps { -2..3 } else { 0..1 });
+            for v in tiles[1].clone() {
+                for u in tiles[0].clone() {
+                    let moved = corners
+                        .map(|at| [at[0] + f64::from(u) * size[0], at[1] + f64::from(v) * size[1]]);
+                    rasterizer.mark(moved, &mut covered);
+                }
+            }
+        }
+        covered
+    }
+}

@@ -1,0 +1,129 @@
+//! Decoded pictures, shared between the blocks that use them and dropped after the last.
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use super::picture::{self, Picture};
+use super::plan::TexturePlan;
+use crate::mesh::{Model, Warnings};
+
+/// A decoded picture and what names it.
+#[derive(Debug)]
+pub(crate) struct Decoded {
+    pub picture: Arc<Picture>,
+    hash: OnceLock<blake3::Hash>,
+}
+
+impl Decoded {
+    pub fn new(picture: Picture) -> Self {
+        Self { picture: Arc::new(picture), hash: OnceLock::new() }
+    }
+
+    /// Of the texels and the size, so that equal pictures of different inputs are one.
+    pub fn hash(&self) -> &blake3::Hash {
+        self.hash.get_or_init(|| {
+            let mut hasher = blake3::Hasher::new();
+            hasher.update(&self.picture.width.to_le_bytes());
+            hasher.update(&self.picture.height.to_le_bytes());
+            hasher.update(&[self.picture.channels]);
+            hasher.update(&self.picture.pixels);
+            hasher.finalize()
+        })
+    }
+}
+
+/// The pictures of one input. Each is decoded when the first block takes it, and let go of when
+/// the last one has taken it.
+#[derive(Debug)]
+pub struct TextureCache<'a> {
+    model: &'a Model,
+    plan: &'a TexturePlan,
+    slots: Vec<Mutex<Slot>>,
+}
+
+#[derive(Debug, Default)]
+struct Slot {
+    takers: u32,
+    state: State,
+}
+
+#[derive(Debug, Default)]
+enum State {
+    #[default]
+    Waiting,
+    Decoded(Arc<Decoded>),
+    Failed(String),
+}
+
+impl<'a> TextureCache<'a> {
+    /// A cache for blocks that use these materials (one list a block, in any order, repeats
+    /// allowed). Decodes nothing yet.
+    pub fn new<M: IntoIterator<Item = u32>>(
+        model: &'a Model,
+        plan: &'a TexturePlan,
+        blocks: impl IntoIterator<Item = M>,
+    ) -> Self {
+        let mut slots: Vec<Slot> = Vec::new();
+        slots.resize_with(plan.texture_count(), Slot::default);
+        for materials in blocks {
+            for texture in plan.textures_of(materials) {
+                slots[texture as usize].takers += 1;
+            }
+        }
+        Self { model, plan, slots: slots.into_iter().map(Mutex::new).collect() }
+    }
+
+    /// The model whose pictures these are.
+    pub fn model(&self) -> &'a Model {
+        self.model
+    }
+
+    /// What is cut up and what is kept whole.
+    pub fn plan(&self) -> &'a TexturePlan {
+        self.plan
+    }
+
+    /// The picture, decoded now if it is not yet; `None` where it cannot be. To be called once
+    /// for each block that was announced.
+    pub(crate) fn take(&self, texture: u32) -> Option<Arc<Decoded>> {
+        let slot = self.slots.get(texture as usize)?;
+        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        slot.takers = slot.takers.saturating_sub(1);
+        if matches!(slot.state, State::Waiting) {
+            slot.state = self.decode(texture);
+        }
+        let State::Decoded(decoded) = &slot.state else { return None };
+        let decoded = Arc::clone(decoded);
+        if slot.takers == 0 {
+            slot.state = State::Waiting;
+        }
+        Some(decoded)
+    }
+
+    fn decode(&self, texture: u32) -> State {
+        let source = &self.model.textures[texture as usize];
+        let picture = match picture::decode_texture(source) {
+            Ok(picture) => picture,
+            Err(error) => return State::Failed(error.to_string()),
+        };
+        let bytes = picture.texels() * u64::from(picture.channels);
+        if picture.texels() == 0 || picture.pixels.len() as u64 != bytes {
+            let size = format!("{} × {}", picture.width, picture.height);
+            return State::Failed(format!("{}: a picture of {size} texels", source.name));
+        }
+        let alpha = self.plan.needs_alpha(texture) && picture.has_transparency();
+        let picture = if alpha { picture } else { picture.into_opaque() };
+        State::Decoded(Arc::new(Decoded::new(picture)))
+    }
+
+    /// One warning for each picture that could not be decoded, in the model's order.
+    pub fn warnings(&self) -> Warnings {
+        let mut warnings = Warnings::default();
+        for slot in &self.slots {
+            let slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
+            if let State::Failed(what) = &slot.state {
+                warnings.add(format!("{what}; drawn without texture"), 1);
+            }
+        }
+        warnings
+    }
+}

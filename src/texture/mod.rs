@@ -1,0 +1,41 @@
+//! Textures of nodes: the source's texels that a node's triangles use, at the node's resolution,
+//! and no others.
+//!
+//! [`TexturePlan`] decides for each texture of an input whether it is cut up or, as it repeats,
+//! kept whole. [`TextureCache`] decodes each picture once. [`BlockTextures`] scales what a block
+//! uses for every level, in linear light and without mixing in texels that nothing uses; its
+//! [`node_mesh`](BlockTextures::node_mesh) copies what a node uses into an atlas of its own.
+//! [`SharedTextures`] keeps the repeating ones, once for each resolution.
+//!
+//! Texel `(x, y)` covers `x..x + 1`, `y..y + 1` of a picture; a texture coordinate times the
+//! picture's size is a position in it. Bilinear filtering at a position reads the texels whose
+//! centre is less than one texel away.
+
+mod atlas;
+mod bits;
+mod block;
+mod cache;
+mod charts;
+mod encode;
+mod fill;
+mod islands;
+mod level;
+mod node;
+mod pack;
+mod picture;
+mod plan;
+mod raster;
+mod scale;
+mod shared;
+mod srgb;
+#[cfg(test)]
+mod survey;
+#[cfg(test)]
+mod tests;
+
+pub use block::{BlockTextures, TextureOptions};
+pub use cache::TextureCache;
+pub use node::TexturedNode;
+pub use picture::{Picture, decode_texture};
+pub use plan::{TexturePlan, TextureUse};
+pub use shared::{SharedFile, SharedTextures};

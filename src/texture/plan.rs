@@ -1,0 +1,106 @@
+//! Which textures are cut up and which are kept whole.
+
+use super::charts::{self, Charts};
+use crate::mesh::{Model, Wrap};
+
+/// How a texture reaches the nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TextureUse {
+    /// No triangle uses it.
+    Unused,
+    /// Its texels are used about once: each node gets a copy of those that its triangles use.
+    Atlas,
+    /// It repeats, or many triangles share its texels: kept whole and shared between nodes.
+    Repeating,
+}
+
+/// A texture whose triangles' areas in texture space sum up to more than this many times the
+/// picture is shared: copies of its texels would outgrow it.
+const MAX_REUSE: f64 = 1.25;
+
+/// The use of each texture of a [`Model`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TexturePlan {
+    uses: Vec<TextureUse>,
+    materials: Vec<Option<u32>>,
+    alpha: Vec<bool>,
+}
+
+impl TexturePlan {
+    /// Decides from the model's triangles and materials, without looking at any picture.
+    pub fn new(model: &Model) -> Self {
+        let mut areas = vec![0.0; model.textures.len()];
+        let mut uses = vec![TextureUse::Unused; model.textures.len()];
+        for part in &model.parts {
+            let Some(material) = model.materials.get(part.material as usize) else { continue };
+            let Some(texture) = material.texture.map(|texture| texture as usize) else { continue };
+            if texture >= uses.len() || part.texcoords.len() != part.positions.len() {
+                continue;
+            }
+            let triangles = part.indices.as_chunks::<3>().0;
+            let charts = Charts::find(&part.texcoords, triangles.iter().copied());
+            areas[texture] += triangles.iter().map(|t| uv_area(&part.texcoords, *t)).sum::<f64>();
+            let whole = charts.boxes.iter().any(|chart| {
+                (0..2).any(|axis| match material.wrap[axis] {
+                    Wrap::Repeat => chart.exceeds_tile(axis),
+                    Wrap::Mirror => true,
+                    Wrap::Clamp => chart.crosses_border(axis) || chart.tile(axis) != 0.0,
+                })
+            });
+            if whole {
+                uses[texture] = TextureUse::Repeating;
+            } else if uses[texture] == TextureUse::Unused {
+                uses[texture] = TextureUse::Atlas;
+            }
+        }
+        for (texture, area) in uses.iter_mut().zip(areas) {
+            if *texture == TextureUse::Atlas && area > MAX_REUSE {
+                *texture = TextureUse::Repeating;
+            }
+        }
+        let mut alpha = vec![false; uses.len()];
+        for material in &model.materials {
+            if let Some(needed) = material.texture.and_then(|index| alpha.get_mut(index as usize)) {
+                *needed |= material.alpha != crate::mesh::AlphaMode::Opaque;
+            }
+        }
+        let in_range = |texture: &u32| (*texture as usize) < uses.len();
+        let materials = model.materials.iter().map(|m| m.texture.filter(in_range)).collect();
+        Self { uses, materials, alpha }
+    }
+
+    /// The use of a texture; [`TextureUse::Unused`] where there is no such texture.
+    pub fn texture_use(&self, texture: u32) -> TextureUse {
+        self.uses.get(texture as usize).copied().unwrap_or(TextureUse::Unused)
+    }
+
+    /// The texture of a material, if it has one.
+    pub fn texture_of(&self, material: u32) -> Option<u32> {
+        self.materials.get(material as usize).copied().flatten()
+    }
+
+    /// True where some material that uses the texture looks at its alpha.
+    pub(crate) fn needs_alpha(&self, texture: u32) -> bool {
+        self.alpha.get(texture as usize).copied().unwrap_or(false)
+    }
+
+    /// The number of textures of the model.
+    pub fn texture_count(&self) -> usize {
+        self.uses.len()
+    }
+
+    /// The textures that these materials use, each once, ascending.
+    pub fn textures_of(&self, materials: impl IntoIterator<Item = u32>) -> Vec<u32> {
+        let mut textures: Vec<u32> =
+            materials.into_iter().filter_map(|material| self.texture_of(material)).collect();
+        textures.sort_unstable();
+        textures.dedup();
+        textures
+    }
+}
+
+/// The area of a triangle in texture space, in tiles.
+pub(crate) fn uv_area(texcoords: &[[f32; 2]], triangle: [u32; 3]) -> f64 {
+    let [a, b, c] = triangle.map(|vertex| charts::sane(texcoords[vertex as usize]));
+    0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])).abs()
+}
