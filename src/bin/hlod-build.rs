@@ -1,2 +1,273 @@
-//! Placeholder.
-fn main() {}
+//! `hlod-build INPUT... OUT`: arguments in, exit code out.
+
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use hlod::build::blocks::BlockMode;
+use hlod::build::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
+use hlod::build::pipeline::with_threads;
+use hlod::build::progress::Progress;
+use hlod::build::simplify::Simplifier;
+use hlod::build::{BuildOptions, Outcome, build};
+use hlod::format::Scene;
+use hlod::mesh::UpAxis;
+use hlod::report::{build_summary, inspect};
+use hlod::{Error, Result};
+use indicatif::{HumanCount, ProgressBar, ProgressStyle};
+
+/// Turns city meshes into a hierarchy of levels of detail.
+///
+/// Reads OBJ, glTF and GLB files, or folders of them; divides them into blocks; and writes for
+/// every block a tree of nodes, coarse and whole at the root, original and in pieces at the
+/// leaves, as OUT/scene.hlod, OUT/nodes/*.glb and OUT/build.json. What stood in OUT before stays
+/// until the new result is complete. Where inputs and options have not changed, nothing is done.
+#[derive(Parser, Debug)]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    override_usage = "hlod-build [OPTIONS] INPUT... OUT\n       hlod-build inspect [--json] OUT",
+    after_help = "Examples:\n  hlod-build city.obj out/\n  hlod-build --blocks grid:200 tiles/ more.glb out/\n  hlod-build inspect out/\n\nExit codes: 0 success, 1 internal error, 2 usage, 3 input missing or invalid, 4 output not written."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    build: BuildArgs,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Prints a built hierarchy: for people, or with --json for programs
+    Inspect {
+        /// The output folder of an earlier build
+        out: PathBuf,
+        /// One JSON object with `nodes` and all their attributes
+        #[arg(long)]
+        json: bool,
+        /// Show at most N blocks' trees
+        #[arg(long, value_name = "N", default_value_t = 20)]
+        blocks: usize,
+    },
+}
+
+#[derive(Args, Debug)]
+struct BuildArgs {
+    /// Models (.obj, .gltf, .glb) or folders of them; the last is the output folder
+    #[arg(value_name = "INPUT... OUT", required = true, num_args = 2..)]
+    paths: Vec<PathBuf>,
+
+    /// How inputs become blocks: `auto` (groups where they make sense, merged where tiny, divided
+    /// where huge), `groups`, or `grid:METRES`
+    #[arg(long, value_name = "MODE", default_value = "auto", help_heading = "Hierarchy")]
+    blocks: BlockMode,
+    /// Ratio of triangles and texels between levels, and pieces a node is cut into, 2-64. More:
+    /// fewer levels, coarser steps between them
+    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Hierarchy")]
+    level_factor: u32,
+    /// Triangles wanted in a node, 1 or more. More: fewer, larger files
+    #[arg(long, value_name = "N", default_value_t = 900, help_heading = "Hierarchy")]
+    desired_tris: u32,
+    /// How coarse nodes are made
+    #[arg(long, value_enum, default_value_t = SimplifierArg::Qem, help_heading = "Hierarchy")]
+    simplifier: SimplifierArg,
+    /// What coarse nodes are made from: `original` is the thesis's way and slower
+    #[arg(long, value_enum, default_value_t = FromArg::Children, help_heading = "Hierarchy")]
+    simplify_from: FromArg,
+    /// What happens to vertices on cutting planes: `skirts` thins them alike on both sides and
+    /// covers the gaps between levels, `shared` leaves those gaps, `locked` keeps every vertex
+    #[arg(long, value_enum, default_value_t = BordersArg::Skirts, help_heading = "Hierarchy")]
+    borders: BordersArg,
+    /// The axis that points at the sky, where the input does not say [default: looked up in the
+    /// format, else guessed from the shape]
+    #[arg(long, value_enum, help_heading = "Hierarchy")]
+    up: Option<UpArg>,
+
+    /// Quality of JPEG textures, 1-100. From 90 on, colour keeps its full resolution
+    #[arg(long, value_name = "Q", default_value_t = 85, help_heading = "Textures")]
+    jpeg_quality: u8,
+    /// Longest side of a node's atlas in texels, 16-65535
+    #[arg(long, value_name = "TEXELS", default_value_t = 4096, help_heading = "Textures")]
+    max_atlas: u32,
+
+    /// Threads; 0 is one for each core. The result does not depend on it
+    #[arg(long, short = 'j', value_name = "N", default_value_t = 0, help_heading = "Running")]
+    threads: usize,
+    /// Build even where nothing has changed
+    #[arg(long, help_heading = "Running")]
+    force: bool,
+    /// Print nothing but errors
+    #[arg(long, short, help_heading = "Running")]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SimplifierArg {
+    /// Quadric error metrics
+    Qem,
+    /// Vertex clustering (Cozzi & Loo)
+    Clustering,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FromArg {
+    Original,
+    Children,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum BordersArg {
+    Locked,
+    Shared,
+    Skirts,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum UpArg {
+    Y,
+    Z,
+}
+
+impl BuildArgs {
+    fn options(&self) -> BuildOptions {
+        BuildOptions {
+            hierarchy: HierarchyOptions {
+                desired_tris: self.desired_tris,
+                level_factor: self.level_factor,
+                simplify_from: match self.simplify_from {
+                    FromArg::Original => SimplifyFrom::Original,
+                    FromArg::Children => SimplifyFrom::Children,
+                },
+                simplifier: match self.simplifier {
+                    SimplifierArg::Qem => Simplifier::Qem,
+                    SimplifierArg::Clustering => Simplifier::Clustering,
+                },
+                borders: match self.borders {
+                    BordersArg::Locked => BorderMode::Locked,
+                    BordersArg::Shared => BorderMode::Shared,
+                    BordersArg::Skirts => BorderMode::Skirts,
+                },
+                ..Default::default()
+            },
+            blocks: self.blocks,
+            up: self.up.map(|up| match up {
+                UpArg::Y => UpAxis::Y,
+                UpArg::Z => UpAxis::Z,
+            }),
+            jpeg_quality: self.jpeg_quality,
+            max_atlas: self.max_atlas,
+            force: self.force,
+            ..Default::default()
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let done = match cli.command {
+        Some(Command::Inspect { out, json, blocks }) => inspect_scene(&out, json, blocks),
+        None => run(&cli.build),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("hlod-build: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn run(arguments: &BuildArgs) -> Result<()> {
+    let [inputs @ .., out] = &arguments.paths[..] else {
+        return Err(Error::Usage("expected INPUT... and OUT".into()));
+    };
+    let options = arguments.options();
+    let bar = Bar::new(arguments.quiet);
+    let outcome = with_threads(arguments.threads, || build(inputs, out, &options, &bar))?;
+    bar.bar.finish_and_clear();
+    if arguments.quiet {
+        return Ok(());
+    }
+    print(&match outcome? {
+        Outcome::UpToDate(report) => build_summary::up_to_date(&report, out),
+        Outcome::Built(report) => build_summary::built(&report, out),
+    })
+}
+
+fn inspect_scene(out: &Path, json: bool, blocks: usize) -> Result<()> {
+    let scene = Scene::read(out)?;
+    print(&if json {
+        format!("{:#}\n", inspect::json(&scene))
+    } else {
+        inspect::text(&scene, blocks)
+    })
+}
+
+/// To standard output; that nobody reads on (`| head`) is no error.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::output("standard output", error.to_string()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Progress on a terminal; nothing elsewhere.
+struct Bar {
+    bar: ProgressBar,
+    found: AtomicU64,
+}
+
+impl Bar {
+    fn new(quiet: bool) -> Self {
+        let bar = if quiet || !std::io::stderr().is_terminal() {
+            ProgressBar::hidden()
+        } else {
+            let bar = ProgressBar::new(0);
+            let style = ProgressStyle::with_template(
+                "{msg:24} {wide_bar} {percent:>3} %  {rate}  {eta} left",
+            );
+            if let Ok(style) = style {
+                bar.set_style(style.with_key(
+                    "rate",
+                    |state: &indicatif::ProgressState, out: &mut dyn std::fmt::Write| {
+                        let rate = HumanCount(state.per_sec() as u64);
+                        drop(write!(out, "{rate} triangles/s"));
+                    },
+                ));
+            }
+            bar.enable_steady_tick(Duration::from_millis(200));
+            bar
+        };
+        Self { bar, found: AtomicU64::new(0) }
+    }
+}
+
+impl Progress for Bar {
+    fn reading(&self, input: &Path, number: usize, of: usize) {
+        let name = input.file_name().unwrap_or_default().to_string_lossy();
+        self.bar.set_message(if of > 1 {
+            format!("{name} ({number} of {of})")
+        } else {
+            name.into()
+        });
+    }
+
+    fn found(&self, triangles: u64) {
+        let total = self.found.fetch_add(triangles, Ordering::Relaxed) + triangles;
+        self.bar.set_length(total);
+    }
+
+    fn built(&self, triangles: u64) {
+        self.bar.inc(triangles);
+    }
+
+    fn finishing(&self) {
+        self.bar.set_message("writing the scene");
+    }
+}

@@ -34,8 +34,8 @@ pub struct NodeRecord {
     pub level: u32,
     /// The triangles that it may have.
     pub budget: usize,
-    /// How it was made.
-    pub step: LadderStep,
+    /// How it was made; `None` where it was taken over from an earlier build.
+    pub step: Option<LadderStep>,
     /// Why it has more than it may, where it has.
     pub reason: Option<String>,
     /// What was imperfect.
@@ -109,7 +109,7 @@ impl NodeSink for DiskSink<'_> {
                 shared,
                 level: node.level as u32,
                 budget: node.budget,
-                step: node.step,
+                step: Some(node.step),
                 reason: over_budget(node, attributes.triangles as usize),
                 warnings,
             })

@@ -9,29 +9,27 @@ use super::border::{Border, Path};
 use super::chain::{Chain, CutPlane, KeepRule};
 use super::cut::{Cut, CutTolerance, Piece, cut};
 use super::lattice::Lattice;
-use crate::mesh::{Mesh, Model, PositionKey, key};
+use crate::mesh::{Material, Mesh, Part, PositionKey, key};
 
 /// What makes two source vertices one.
 type VertexKey = (PositionKey<f64>, [u32; 2], [u16; 4], u32);
 
 /// Joins parts into one piece; vertices that are equal in position, texture coordinate, colour
 /// and material become one.
-pub fn gather(model: &Model, parts: &[usize]) -> Piece<f64> {
-    let textured = |part: usize| {
-        let part = &model.parts[part];
-        model.materials[part.material as usize].texture.is_some() && !part.texcoords.is_empty()
+pub fn gather(materials: &[Material], parts: &[Part]) -> Piece<f64> {
+    let textured = |part: &Part| {
+        materials[part.material as usize].texture.is_some() && !part.texcoords.is_empty()
     };
-    let any_textured = parts.iter().any(|&part| textured(part));
-    let any_colored = parts.iter().any(|&part| !model.parts[part].colors.is_empty());
+    let any_textured = parts.iter().any(textured);
+    let any_colored = parts.iter().any(|part| !part.colors.is_empty());
     let mut mesh = Mesh::<f64>::default();
-    let total: usize = parts.iter().map(|&part| model.parts[part].indices.len() / 3).sum();
+    let total: usize = parts.iter().map(|part| part.indices.len() / 3).sum();
     mesh.triangles.reserve_exact(total);
     let mut welded: FxHashMap<VertexKey, u32> = FxHashMap::default();
     welded.reserve(total / 2);
     let mut new_index: Vec<u32> = Vec::new();
-    for &number in parts {
-        let part = &model.parts[number];
-        let has_texcoords = textured(number);
+    for part in parts {
+        let has_texcoords = textured(part);
         new_index.clear();
         new_index.extend((0..part.positions.len()).map(|vertex| {
             let position = part.positions[vertex].map(|coordinate| coordinate + 0.0);
@@ -143,18 +141,18 @@ fn grid_line(mesh: &Mesh<f64>, metres: f64, axes: [usize; 2]) -> Option<(usize, 
 
 /// Brings a piece to its block's origin and lattice; triangles that collapse on the lattice are
 /// dropped and counted.
-pub fn localise(piece: &Piece<f64>, origin: [f64; 3], lattice: Lattice) -> (Piece, u64) {
+pub fn localise(piece: Piece<f64>, origin: [f64; 3], lattice: Lattice) -> (Piece, u64) {
     let local = |position: [f64; 3]| -> [f32; 3] {
         std::array::from_fn(|i| lattice.offset(position[i], origin[i]) + 0.0)
     };
-    let mesh = Mesh {
-        positions: piece.mesh.positions.iter().map(|&position| local(position)).collect(),
-        texcoords: piece.mesh.texcoords.clone(),
-        colors: piece.mesh.colors.clone(),
-        materials: piece.mesh.materials.clone(),
-        triangles: piece.mesh.triangles.clone(),
+    let Piece { mesh, border, path: wide_path } = piece;
+    let mut mesh = Mesh {
+        positions: mesh.positions.iter().map(|&position| local(position)).collect(),
+        texcoords: mesh.texcoords,
+        colors: mesh.colors,
+        materials: mesh.materials,
+        triangles: mesh.triangles,
     };
-    let mut mesh = mesh;
     let before = mesh.triangles.len();
     let positions = &mesh.positions;
     mesh.triangles.retain(|&[a, b, c]| {
@@ -163,8 +161,8 @@ pub fn localise(piece: &Piece<f64>, origin: [f64; 3], lattice: Lattice) -> (Piec
     });
     let dropped = (before - mesh.triangles.len()) as u64;
     let mut path = Path::default();
-    for bit in 0..piece.path.len() as u32 {
-        let plane = piece.path.plane(bit);
+    for bit in 0..wide_path.len() as u32 {
+        let plane = wide_path.plane(bit);
         let chains = plane
             .chains
             .iter()
@@ -176,5 +174,5 @@ pub fn localise(piece: &Piece<f64>, origin: [f64; 3], lattice: Lattice) -> (Piec
         let coordinate = lattice.offset(plane.coordinate, origin[plane.axis]);
         path = path.with(Arc::new(CutPlane::from_chains(plane.axis, coordinate, chains)));
     }
-    (Piece { mesh, border: piece.border.clone(), path }, dropped)
+    (Piece { mesh, border, path }, dropped)
 }

@@ -42,6 +42,18 @@ pub enum LadderStep {
     Clustering,
 }
 
+impl LadderStep {
+    /// For reports.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Original => "original geometry",
+            Self::Collapse => "edge collapse within texture seams",
+            Self::Permissive => "edge collapse across texture seams",
+            Self::Clustering => "vertex clustering",
+        }
+    }
+}
+
 /// Weights of the appearance against the geometry.
 #[derive(Clone, Copy, Debug)]
 pub struct AppearanceWeights {

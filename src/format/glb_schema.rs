@@ -89,7 +89,6 @@ pub(super) struct Placement {
 pub(super) struct Extras {
     pub id: u64,
     pub level: u32,
-    pub block: Option<u32>,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -8,7 +8,7 @@ use super::test_mesh::mesh;
 use super::{glb_read::read_glb, glb_schema};
 use crate::mesh::{AlphaMode, UpAxis, Wrap};
 
-const LABEL: NodeLabel = NodeLabel { id: u64::MAX, level: 2, block: Some(7) };
+const LABEL: NodeLabel = NodeLabel { id: u64::MAX, level: 2 };
 
 fn write(mesh: &NodeMesh, up: UpAxis) -> Vec<u8> {
     write_glb(mesh, up, LABEL).unwrap()

@@ -14,8 +14,6 @@ pub struct NodeLabel {
     pub id: u64,
     /// [`Node::level`](super::Node::level).
     pub level: u32,
-    /// [`Node::block`](super::Node::block).
-    pub block: Option<u32>,
 }
 
 /// The bytes of a node's file. They depend on the arguments and this crate's version alone.
@@ -103,12 +101,12 @@ fn placement(mesh: &NodeMesh, up: UpAxis, label: NodeLabel) -> Result<Placement>
             (None, Some(matrix))
         }
     };
-    let NodeLabel { id, level, block } = label;
+    let NodeLabel { id, level } = label;
     Ok(Placement {
         mesh: (!mesh.primitives.is_empty()).then_some(0),
         translation,
         matrix,
-        extras: Extras { id, level, block },
+        extras: Extras { id, level },
     })
 }
 

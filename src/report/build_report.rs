@@ -15,6 +15,8 @@ pub struct BuildReport {
     pub inputs: Vec<InputReport>,
     /// Triangles of all inputs after import.
     pub source_triangles: u64,
+    /// Different texels of the source that its triangles use; 0 where inputs were taken over.
+    pub source_texels: u64,
     /// One entry a level, the roots' first.
     pub levels: Vec<LevelReport>,
     /// Stages in the order in which they began.

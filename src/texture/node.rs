@@ -72,12 +72,20 @@ struct Group {
 impl BlockTextures<'_> {
     /// The node of a simplified (or original) piece of the block at `level`, 0 being the root's.
     ///
-    /// `origin` is the block's, in source coordinates. Whatever the mesh names that the model
+    /// `origin` is the block's, in source coordinates. `alike` are pairs of vertices that belong
+    /// to one chart though no triangle joins them, such as a skirt's corner and the border vertex
+    /// that it copies. Whatever the mesh names that the model
     /// does not have is drawn plain.
-    pub fn node_mesh(&self, mesh: &Mesh, level: usize, origin: [f64; 3]) -> Result<TexturedNode> {
+    pub fn node_mesh(
+        &self,
+        mesh: &Mesh,
+        alike: &[[u32; 2]],
+        level: usize,
+        origin: [f64; 3],
+    ) -> Result<TexturedNode> {
         let level = level.min(self.steps.len().saturating_sub(1));
         let mut node = NodeBuilder::new(self, mesh, level);
-        node.find_charts();
+        node.find_charts(alike);
         for channels in [3, 4] {
             node.build_atlas(channels)?;
         }
@@ -130,7 +138,7 @@ impl<'a> NodeBuilder<'a> {
         }
     }
 
-    fn find_charts(&mut self) {
+    fn find_charts(&mut self, alike: &[[u32; 2]]) {
         if self.mesh.texcoords.len() != self.mesh.positions.len() {
             return;
         }
@@ -144,7 +152,12 @@ impl<'a> NodeBuilder<'a> {
             let material = self.mesh.triangle_material(*triangle) as usize;
             textured.get(material).copied().unwrap_or(false)
         });
-        self.charts = Charts::find(&self.mesh.texcoords, triangles);
+        // A pair joins charts as a triangle without area does.
+        let joined = alike.iter().map(|&[a, b]| [a, b, b]).filter(|[a, _, _]| {
+            let material = self.mesh.materials[*a as usize] as usize;
+            textured.get(material).copied().unwrap_or(false)
+        });
+        self.charts = Charts::find(&self.mesh.texcoords, triangles.chain(joined));
         self.chart_textures = vec![0; self.charts.boxes.len()];
         for (vertex, chart) in self.charts.of_vertex.iter().enumerate() {
             if *chart != NO_CHART {

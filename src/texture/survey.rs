@@ -142,7 +142,7 @@ fn survey() {
         let start = Instant::now();
         let nodes: Vec<TexturedNode> = meshes
             .iter()
-            .map(|mesh| block.node_mesh(mesh, level, [0.0; 3]).expect("builds"))
+            .map(|mesh| block.node_mesh(mesh, &[], level, [0.0; 3]).expect("builds"))
             .collect();
         let seconds = start.elapsed().as_secs_f64();
         let texels: u64 = nodes.iter().map(|node| node.own_texels).sum();

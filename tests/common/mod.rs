@@ -103,7 +103,7 @@ pub fn block(mesh: Mesh<f64>) -> (Piece, Lattice) {
     let lattice = Lattice::for_extent(extent, extent);
     let border = Border::interior(mesh.positions.len());
     let piece = Piece { mesh, border, path: Path::default() };
-    (hlod::build::gather::localise(&piece, [0.0; 3], lattice).0, lattice)
+    (hlod::build::gather::localise(piece, [0.0; 3], lattice).0, lattice)
 }
 
 /// A node as the sink saw it.

@@ -1,0 +1,214 @@
+//! From one imported model to the trees of its blocks.
+
+use std::path::Path;
+
+use super::blocks::{BlockPlan, Division, plan};
+use super::cut::Piece;
+use super::disk_sink::{DiskSink, NodeRecord};
+use super::gather::{divide, gather, localise};
+use super::hierarchy::{BlockBuilder, Tree, simplifications};
+use super::lattice::Lattice;
+use super::options::BuildOptions;
+use super::pipeline::in_parallel;
+use super::progress::Progress;
+use super::stages::{Stage, Stages};
+use crate::Result;
+use crate::format::{BlockInfo, OutputDir};
+use crate::mesh::{Model, Part, UpAxis, Warnings};
+use crate::texture::{BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan};
+
+/// A block whose nodes are written.
+#[derive(Debug)]
+pub struct BuiltBlock {
+    /// For `scene.hlod`.
+    pub info: BlockInfo,
+    /// Its nodes.
+    pub tree: Tree<NodeRecord>,
+}
+
+impl BuiltBlock {
+    /// Visits all records, parents first.
+    pub fn for_each<'a>(&'a self, visit: &mut impl FnMut(&'a NodeRecord)) {
+        fn down<'a>(tree: &'a Tree<NodeRecord>, visit: &mut impl FnMut(&'a NodeRecord)) {
+            visit(&tree.record);
+            tree.children.iter().for_each(|child| down(child, visit));
+        }
+        down(&self.tree, visit);
+    }
+}
+
+/// The blocks of one input.
+pub struct BuiltInput {
+    /// In the order of the source.
+    pub blocks: Vec<BuiltBlock>,
+    /// Different source texels that its triangles use, repeating textures aside.
+    pub used_texels: u64,
+    /// What was imperfect.
+    pub warnings: Warnings,
+}
+
+/// A block about to be gathered.
+struct Draft {
+    name: String,
+    source: DraftSource,
+    materials: Vec<u32>,
+}
+
+enum DraftSource {
+    Parts(Vec<Part>),
+    Piece(Box<Piece<f64>>),
+}
+
+impl DraftSource {
+    fn positions(&self) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
+        match self {
+            Self::Parts(parts) => {
+                Box::new(parts.iter().flat_map(|part| part.positions.iter().copied()))
+            }
+            Self::Piece(piece) => Box::new(piece.mesh.positions.iter().copied()),
+        }
+    }
+
+    fn bounds(&self) -> ([f64; 3], [f64; 3]) {
+        let empty = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        self.positions().fold(empty, |(low, high), p| {
+            (std::array::from_fn(|i| low[i].min(p[i])), std::array::from_fn(|i| high[i].max(p[i])))
+        })
+    }
+}
+
+/// Builds all blocks of a model and writes their nodes.
+pub fn build_input(
+    mut model: Model,
+    up: UpAxis,
+    options: &BuildOptions,
+    out: &OutputDir,
+    shared: &SharedTextures,
+    stages: &Stages,
+    progress: &dyn Progress,
+) -> Result<BuiltInput> {
+    let mut warnings = std::mem::take(&mut model.warnings);
+    let plans = plan(&model, options.blocks, options.hierarchy.desired_tris, up);
+    let texture_plan = TexturePlan::new(&model);
+    let drafts = stages.time(Stage::Gather, || drafts(&mut model, plans, options));
+    let lattice = lattice_of(&drafts);
+    let cache = TextureCache::new(
+        &model,
+        &texture_plan,
+        drafts.iter().map(|draft| draft.materials.iter().copied()),
+    );
+    let prefix = file_prefix(&model.source);
+    let built = in_parallel(drafts, |number, draft| {
+        let Draft { name, source, .. } = draft;
+        let (low, high) = source.bounds();
+        let origin = lattice.origin_near(std::array::from_fn(|i| (low[i] + high[i]) * 0.5));
+        let (piece, collapsed) = stages.time(Stage::Gather, || {
+            let piece = match source {
+                DraftSource::Parts(parts) => gather(&model.materials, &parts),
+                DraftSource::Piece(piece) => *piece,
+            };
+            localise(piece, origin, lattice)
+        });
+        let mut warnings = Warnings::default();
+        warnings.add(
+            format!(
+                "{}: triangle thinner than the precision of its block ({:e} m) left out",
+                model.source.display(),
+                lattice.step
+            ),
+            collapsed,
+        );
+        if piece.mesh.triangles.is_empty() {
+            progress.built(collapsed);
+            return Ok((None, warnings, 0));
+        }
+        let factors = simplifications(piece.mesh.triangles.len(), &options.hierarchy);
+        let texture_options =
+            TextureOptions { jpeg_quality: options.jpeg_quality, max_atlas: options.max_atlas };
+        let textures = stages.time(Stage::Pictures, || {
+            BlockTextures::prepare(&cache, shared, &piece.mesh, &factors, texture_options)
+        });
+        let sink = DiskSink {
+            textures: &textures,
+            out,
+            prefix: format!("{prefix}-{number:04}"),
+            origin,
+            up,
+            textured_weight: options.textured_weight,
+            stages,
+            progress,
+        };
+        let builder =
+            BlockBuilder { options: &options.hierarchy, factors, lattice, sink: &sink, stages };
+        let tree = builder.build(piece)?;
+        let info = BlockInfo { name, input: super::inputs::text_of(&model.source), origin };
+        Ok((Some(BuiltBlock { info, tree }), warnings, textures.used_texels()))
+    })?;
+    let mut blocks = Vec::with_capacity(built.len());
+    let mut used_texels = 0;
+    for (block, block_warnings, texels) in built {
+        blocks.extend(block);
+        warnings.extend(block_warnings);
+        used_texels += texels;
+    }
+    warnings.extend(cache.warnings());
+    Ok(BuiltInput { blocks, used_texels, warnings })
+}
+
+/// Takes the parts out of the model and divides those blocks that are to be divided.
+fn drafts(model: &mut Model, plans: Vec<BlockPlan>, options: &BuildOptions) -> Vec<Draft> {
+    let mut parts: Vec<Option<Part>> =
+        std::mem::take(&mut model.parts).into_iter().map(Some).collect();
+    let mut drafts = Vec::with_capacity(plans.len());
+    for BlockPlan { name, parts: numbers, divide: division } in plans {
+        let parts: Vec<Part> = numbers.iter().filter_map(|&number| parts[number].take()).collect();
+        if division == Division::Whole {
+            let mut materials: Vec<u32> = parts.iter().map(|part| part.material).collect();
+            materials.sort_unstable();
+            materials.dedup();
+            drafts.push(Draft { name, source: DraftSource::Parts(parts), materials });
+            continue;
+        }
+        let piece = gather(&model.materials, &parts);
+        drop(parts);
+        let most = match division {
+            Division::Halves { most } => most,
+            Division::Whole | Division::Grid { .. } => piece.mesh.triangles.len(),
+        };
+        // The blocks' own factors are not known yet; those of the largest serve all.
+        let factors = simplifications(most.min(piece.mesh.triangles.len()), &options.hierarchy);
+        let shares: Vec<f64> = factors.iter().map(|factor| 1.0 / factor.sqrt()).collect();
+        let pieces = divide(piece, division, &shares);
+        let several = pieces.len() > 1;
+        for (number, piece) in pieces.into_iter().enumerate() {
+            let mut materials = piece.mesh.materials.clone();
+            materials.sort_unstable();
+            materials.dedup();
+            let name = if several { format!("{name} {}", number + 1) } else { name.clone() };
+            drafts.push(Draft { name, source: DraftSource::Piece(Box::new(piece)), materials });
+        }
+    }
+    drafts
+}
+
+/// One lattice for all blocks of an input, so that blocks that touch agree on where.
+fn lattice_of(drafts: &[Draft]) -> Lattice {
+    let (mut extent, mut magnitude) = (0f64, 0f64);
+    for draft in drafts {
+        let (low, high) = draft.source.bounds();
+        for i in 0..3 {
+            extent = extent.max(high[i] - low[i]);
+            magnitude = magnitude.max(low[i].abs()).max(high[i].abs());
+        }
+    }
+    Lattice::for_extent(extent, magnitude)
+}
+
+/// The beginning of an input's file names: its name for people, a hash of its path for programs.
+fn file_prefix(input: &Path) -> String {
+    let stem = input.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    let plain: String =
+        stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(40).collect();
+    let hash = blake3::hash(super::inputs::text_of(input).as_bytes()).to_hex();
+    format!("{plain}-{}", &hash.as_str()[..6])
+}

@@ -1,0 +1,292 @@
+//! The whole build: inputs one after another, blocks in parallel, everything in its place at the
+//! end or nothing changed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::block::{BuiltBlock, build_input};
+use super::disk_sink::{NodeRecord, check_unique};
+use super::forest::{append_nodes, make_errors_monotone};
+use super::inputs::{describe, fingerprint, text_of, unchanged};
+use super::options::BuildOptions;
+use super::progress::Progress;
+use super::reuse::Earlier;
+use super::simplify::BUDGET_TOLERANCE;
+use super::stages::{Stage, Stages};
+use crate::format::{
+    BlockInfo, NODES_DIR, OutputDir, REPORT_FILE, SCENE_FILE, Scene, SharedTexture, TEXTURES_DIR,
+    check_apart,
+};
+use crate::mesh::{Model, UpAxis, Warnings};
+use crate::report::build_report::{
+    BuildReport, Count, InputReport, OverBudget, StageReport, level_reports,
+};
+use crate::texture::SharedTextures;
+use crate::{Error, Result, import};
+
+/// How a build ended.
+#[derive(Debug)]
+pub enum Outcome {
+    /// Nothing had changed; nothing was done. Holds the report of the build that made the result.
+    UpToDate(BuildReport),
+    /// A new result stands in the output folder.
+    Built(BuildReport),
+}
+
+/// Builds `out` from model files and folders.
+pub fn build(
+    arguments: &[PathBuf],
+    out: &Path,
+    options: &BuildOptions,
+    progress: &dyn Progress,
+) -> Result<Outcome> {
+    let begin = Instant::now();
+    options.check()?;
+    let inputs = import::find_inputs(arguments)?;
+    check_apart(out, &inputs)?;
+    let stages = Stages::default();
+    let parameters = options.to_json();
+
+    let earlier = if options.force { None } else { Earlier::open(out, &parameters) };
+    let still_good: Vec<Option<InputReport>> = stages.time(Stage::Compare, || {
+        let same = |input: &PathBuf| {
+            let report = earlier.as_ref()?.input(&text_of(input))?;
+            unchanged(report).then(|| report.clone())
+        };
+        inputs.iter().map(same).collect()
+    });
+    if let Some(earlier) = &earlier
+        && still_good.iter().all(Option::is_some)
+        && earlier.report.inputs.len() == inputs.len()
+    {
+        return Ok(Outcome::UpToDate(earlier.report.clone()));
+    }
+
+    let output = OutputDir::create(out)?;
+    let shared = SharedTextures::new();
+    let mut warnings = Warnings::default();
+    let mut reports = Vec::with_capacity(inputs.len());
+    let mut blocks: Vec<BuiltBlock> = Vec::new();
+    let mut ups = Vec::new();
+    let mut source = SourceFigures::default();
+    let mut reused_textures: BTreeMap<String, SharedTexture> = BTreeMap::new();
+    let mut ahead: Option<Result<Model>> = None;
+
+    for (number, input) in inputs.iter().enumerate() {
+        if let (Some(report), Some(earlier)) = (&still_good[number], &earlier) {
+            let taken = earlier.take_over(report, &output)?;
+            source.triangles += taken.source_triangles;
+            progress.built(taken.source_triangles);
+            reused_textures.extend(taken.shared_textures);
+            blocks.extend(taken.blocks);
+            ups.push(earlier.scene.up);
+            reports.push(report.clone());
+            continue;
+        }
+        progress.reading(input, number + 1, inputs.len());
+        let load = |input: &Path| stages.time(Stage::Import, || import::load(input));
+        let model = match ahead.take() {
+            Some(model) => model,
+            None => load(input),
+        }?;
+        let next = inputs[number + 1..]
+            .iter()
+            .zip(&still_good[number + 1..])
+            .find(|(_, good)| good.is_none())
+            .map(|(next, _)| next)
+            .filter(|next| {
+                // Only the input that comes next in turn, and only where both fit in memory.
+                still_good.get(number + 1).is_some_and(Option::is_none) && fits_beside(input, next)
+            });
+        let report = stages.time(Stage::Compare, || describe(input, &model.dependencies))?;
+        let triangles = model.triangle_count() as u64;
+        progress.found(triangles);
+        let up = options.up.or(model.up).unwrap_or_else(|| super::up::guess(&model));
+        let (built, read_ahead) = rayon::join(
+            || build_input(model, up, options, &output, &shared, &stages, progress),
+            || next.map(|next| load(next)),
+        );
+        ahead = read_ahead;
+        let built = built?;
+        warnings.extend(built.warnings);
+        source.add(triangles, built.used_texels);
+        blocks.extend(built.blocks);
+        ups.push(up);
+        reports.push(report);
+    }
+    progress.finishing();
+
+    source.used_texels += shared.source_texels();
+    let mut shared_textures = reused_textures;
+    for file in shared.into_files() {
+        let texture = SharedTexture {
+            file_name: file.name.to_string(),
+            width: file.width,
+            height: file.height,
+            bytes: file.bytes.len() as u64,
+        };
+        if shared_textures.insert(file.name.to_string(), texture).is_none() {
+            output.write(format!("{TEXTURES_DIR}/{}", file.name), &file.bytes)?;
+        }
+    }
+    let facts = NodeFacts::of(&blocks, &mut warnings);
+    let up = agreed_up(&ups, &mut warnings);
+    let scene = scene_of(blocks, shared_textures, parameters.clone(), up, &reports)?;
+
+    let mut levels = level_reports(&scene);
+    for over in &facts.over_budget {
+        if let Some(node) = scene.nodes.iter().find(|node| node.id == over.id) {
+            levels[node.level as usize].over_budget += 1;
+        }
+    }
+    let report = BuildReport {
+        version: env!("CARGO_PKG_VERSION").into(),
+        parameters,
+        inputs: reports,
+        source_triangles: source.triangles,
+        source_texels: source.used_texels,
+        levels,
+        stages: Stage::ALL
+            .map(|stage| StageReport { stage: stage.name().into(), seconds: stages.seconds(stage) })
+            .to_vec(),
+        seconds: begin.elapsed().as_secs_f64(),
+        peak_memory_bytes: super::memory::peak_bytes(),
+        outcomes: facts.outcomes,
+        over_budget: facts.over_budget,
+        warnings: warnings.iter().map(|(text, count)| Count { text: text.into(), count }).collect(),
+    };
+    output.write(SCENE_FILE, &scene.to_bytes()?)?;
+    output.write(REPORT_FILE, report.to_json()?.as_bytes())?;
+    output.commit()?;
+    Ok(Outcome::Built(report))
+}
+
+#[derive(Default)]
+struct SourceFigures {
+    triangles: u64,
+    used_texels: u64,
+}
+
+impl SourceFigures {
+    fn add(&mut self, triangles: u64, texels: u64) {
+        self.triangles += triangles;
+        self.used_texels += texels;
+    }
+}
+
+/// An input is read while the one before it is built, unless both are large: a file's model takes
+/// about as many bytes as its text.
+fn fits_beside(current: &Path, next: &Path) -> bool {
+    let bytes = |path: &Path| std::fs::metadata(path).map_or(0, |facts| facts.len());
+    bytes(current) + bytes(next) <= super::memory::total_bytes() / 16
+}
+
+/// One direction for the whole scene; the first input's where they differ.
+fn agreed_up(ups: &[UpAxis], warnings: &mut Warnings) -> UpAxis {
+    let first = ups.first().copied().unwrap_or(UpAxis::Z);
+    let others = ups.iter().filter(|&&up| up != first).count() as u64;
+    warnings.add(
+        format!("input with another up axis than the first ({first:?}); set --up to choose one"),
+        others,
+    );
+    first
+}
+
+/// What the report says about nodes.
+struct NodeFacts {
+    outcomes: Vec<Count>,
+    over_budget: Vec<OverBudget>,
+}
+
+impl NodeFacts {
+    fn of(blocks: &[BuiltBlock], warnings: &mut Warnings) -> Self {
+        let mut outcomes: BTreeMap<&'static str, u64> = BTreeMap::new();
+        let mut over_budget = Vec::new();
+        for block in blocks {
+            block.for_each(&mut |record: &NodeRecord| {
+                if let Some(step) = record.step {
+                    *outcomes.entry(step.describe()).or_insert(0) += 1;
+                }
+                warnings.extend(record.warnings.clone());
+                if let Some(reason) = &record.reason {
+                    over_budget.push(OverBudget {
+                        id: record.id,
+                        file: record.file.clone(),
+                        budget: record.budget as u64,
+                        triangles: u64::from(record.attributes.triangles),
+                        reason: reason.clone(),
+                    });
+                }
+            });
+        }
+        over_budget.sort_by_key(|over| over.id);
+        let mut outcomes: Vec<Count> =
+            outcomes.into_iter().map(|(text, count)| Count { text: text.into(), count }).collect();
+        outcomes.sort_by_key(|outcome| std::cmp::Reverse(outcome.count));
+        warnings.add(
+            format!(
+                "node with more than {:.0} % above its triangle budget (see over_budget in {})",
+                (BUDGET_TOLERANCE - 1.0) * 100.0,
+                REPORT_FILE
+            ),
+            over_budget.len() as u64,
+        );
+        Self { outcomes, over_budget }
+    }
+}
+
+/// Joins the blocks' trees to a scene.
+fn scene_of(
+    blocks: Vec<BuiltBlock>,
+    shared_textures: BTreeMap<String, SharedTexture>,
+    parameters: serde_json::Value,
+    up: UpAxis,
+    reports: &[InputReport],
+) -> Result<Scene> {
+    let numbers: BTreeMap<String, u32> = shared_textures.keys().cloned().zip(0u32..).collect();
+    let mut nodes = Vec::new();
+    let mut infos: Vec<BlockInfo> = Vec::with_capacity(blocks.len());
+    for mut block in blocks {
+        make_errors_monotone(&mut block.tree);
+        append_nodes(&mut nodes, block.tree, infos.len() as u32, block.info.origin, &numbers);
+        infos.push(block.info);
+    }
+    if nodes.is_empty() {
+        return Err(Error::Internal("a build without nodes".into()));
+    }
+    let mut ids = nodes.iter().map(|node| (node.id, node.file.clone())).collect();
+    check_unique(&mut ids)?;
+    Ok(Scene {
+        fingerprint: fingerprint(&parameters, reports),
+        parameters,
+        up,
+        blocks: infos,
+        shared_textures: shared_textures.into_values().collect(),
+        nodes,
+    })
+}
+
+/// The folder of nodes of a result, for those who read them.
+pub fn nodes_dir(out: &Path) -> PathBuf {
+    out.join(NODES_DIR)
+}
+
+/// Runs a build on a pool of its own with this many threads; 0 is one per core.
+pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| Error::Usage(format!("{threads} threads cannot be started: {error}")))
+        .map(|pool| pool.install(work))
+}
+
+/// Blocks of an input in parallel, in order.
+pub(super) fn in_parallel<I: Send, O: Send>(
+    items: Vec<I>,
+    work: impl Fn(usize, I) -> Result<O> + Sync,
+) -> Result<Vec<O>> {
+    items.into_par_iter().enumerate().map(|(number, item)| work(number, item)).collect()
+}

@@ -1,0 +1,131 @@
+//! Taking over from an earlier result what has not changed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::attributes::Attributes;
+use super::block::BuiltBlock;
+use super::disk_sink::NodeRecord;
+use super::hierarchy::Tree;
+use crate::Result;
+use crate::format::{NODES_DIR, OutputDir, REPORT_FILE, Scene, SharedTexture, TEXTURES_DIR};
+use crate::mesh::Warnings;
+use crate::report::build_report::{BuildReport, InputReport};
+
+/// A result that was made by this version with the same parameters, and is whole.
+pub struct Earlier {
+    dir: PathBuf,
+    /// Its scene.
+    pub scene: Scene,
+    /// How it was made.
+    pub report: BuildReport,
+}
+
+/// What an unchanged input contributes.
+pub struct Taken {
+    /// Its blocks; their files are in the new output already.
+    pub blocks: Vec<BuiltBlock>,
+    /// Shared textures that its nodes use, by name; likewise.
+    pub shared_textures: BTreeMap<String, SharedTexture>,
+    /// Triangles of its leaves.
+    pub source_triangles: u64,
+}
+
+impl Earlier {
+    /// `None` where there is none, or none that can be used.
+    pub fn open(dir: &Path, parameters: &serde_json::Value) -> Option<Self> {
+        let scene = Scene::read(dir).ok()?;
+        let text = std::fs::read_to_string(dir.join(REPORT_FILE)).ok()?;
+        let report: BuildReport = serde_json::from_str(&text).ok()?;
+        let same = report.version == env!("CARGO_PKG_VERSION")
+            && report.parameters == *parameters
+            && scene.parameters == *parameters;
+        let whole = || {
+            scene.nodes.iter().all(|node| {
+                std::fs::metadata(dir.join(NODES_DIR).join(&node.file))
+                    .is_ok_and(|facts| facts.len() == node.file_bytes)
+            }) && scene.shared_textures.iter().all(|texture| {
+                std::fs::metadata(dir.join(TEXTURES_DIR).join(&texture.file_name))
+                    .is_ok_and(|facts| facts.len() == texture.bytes)
+            })
+        };
+        (same && whole()).then(|| Self { dir: dir.to_path_buf(), scene, report })
+    }
+
+    /// What it knows of an input.
+    pub fn input(&self, path: &str) -> Option<&InputReport> {
+        self.report.inputs.iter().find(|input| input.path == path)
+    }
+
+    /// Links the files of an input's blocks into the new output.
+    pub fn take_over(&self, input: &InputReport, output: &OutputDir) -> Result<Taken> {
+        let mut taken =
+            Taken { blocks: Vec::new(), shared_textures: BTreeMap::new(), source_triangles: 0 };
+        for root in self.scene.roots() {
+            let Some(block) = self.scene.nodes[root as usize].block else { continue };
+            let info = &self.scene.blocks[block as usize];
+            if info.input != input.path {
+                continue;
+            }
+            let tree = self.tree(root, output, &mut taken)?;
+            taken.blocks.push(BuiltBlock { info: info.clone(), tree });
+        }
+        for name in taken.shared_textures.keys() {
+            // Several inputs may share a picture.
+            let relative = format!("{TEXTURES_DIR}/{name}");
+            if !output.path().join(&relative).exists() {
+                output.reuse(&self.dir, relative)?;
+            }
+        }
+        Ok(taken)
+    }
+
+    fn tree(&self, index: u32, output: &OutputDir, taken: &mut Taken) -> Result<Tree<NodeRecord>> {
+        let node = &self.scene.nodes[index as usize];
+        output.reuse(&self.dir, format!("{NODES_DIR}/{}", node.file))?;
+        let mut shared = Vec::new();
+        for &number in &node.shared_textures {
+            let texture = &self.scene.shared_textures[number as usize];
+            shared.push((
+                texture.file_name.clone(),
+                u64::from(texture.width) * u64::from(texture.height),
+            ));
+            taken.shared_textures.insert(texture.file_name.clone(), texture.clone());
+        }
+        let children = self
+            .scene
+            .children(index)
+            .map(|child| self.tree(child, output, taken))
+            .collect::<Result<Vec<_>>>()?;
+        if children.is_empty() {
+            taken.source_triangles += u64::from(node.triangles);
+        }
+        let over = self.report.over_budget.iter().find(|over| over.id == node.id);
+        Ok(Tree {
+            record: NodeRecord {
+                id: node.id,
+                file: node.file.clone(),
+                file_bytes: node.file_bytes,
+                file_crc: node.file_crc,
+                attributes: Attributes {
+                    triangles: node.triangles,
+                    textured_triangles: node.textured_triangles,
+                    bbox_min: node.bbox_min,
+                    bbox_max: node.bbox_max,
+                    cost: node.cost,
+                    static_benefit: node.static_benefit,
+                    average_normal: node.average_normal.map(f64::from),
+                },
+                geometric_error: node.geometric_error,
+                own_texels: node.texels,
+                shared,
+                level: node.level,
+                budget: over.map_or(0, |over| over.budget as usize),
+                step: None,
+                reason: over.map(|over| over.reason.clone()),
+                warnings: Warnings::default(),
+            },
+            children,
+        })
+    }
+}

@@ -1,0 +1,78 @@
+//! The screen that a build ends with.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use super::build_report::BuildReport;
+
+/// Warnings that are shown; the rest is in `build.json`.
+const SHOWN_WARNINGS: usize = 8;
+
+/// After a build.
+pub fn built(report: &BuildReport, out: &Path) -> String {
+    let mut text = String::new();
+    let nodes: u64 = report.levels.iter().map(|level| level.nodes).sum();
+    let bytes: u64 = report.levels.iter().map(|level| level.bytes).sum();
+    let texels: u64 = report.levels.iter().map(|level| level.texels).sum();
+    let rate = report.source_triangles as f64 / report.seconds.max(1e-9);
+    // Writing to a string cannot fail, hence `let _`.
+    let _ = writeln!(
+        text,
+        "{}: {} triangles in {nodes} nodes, {} levels, {:.1} MB",
+        out.display(),
+        report.source_triangles,
+        report.levels.len(),
+        bytes as f64 / 1e6
+    );
+    let _ = writeln!(text, "  level    nodes   triangles   Mtexels       MB");
+    for level in &report.levels {
+        let _ = writeln!(
+            text,
+            "  {:>5} {:>8} {:>11} {:>9.2} {:>8.1}",
+            level.level,
+            level.nodes,
+            level.triangles,
+            level.texels as f64 / 1e6,
+            level.bytes as f64 / 1e6
+        );
+    }
+    if report.source_texels > 0 {
+        let _ = writeln!(
+            text,
+            "  texels in nodes: {:.2} times those that the source uses",
+            texels as f64 / report.source_texels as f64
+        );
+    }
+    let _ = writeln!(
+        text,
+        "  {:.2} s, {:.0} thousand triangles/s, peak memory {:.0} MB",
+        report.seconds,
+        rate / 1e3,
+        report.peak_memory_bytes as f64 / 1e6
+    );
+    let stages: Vec<String> = report
+        .stages
+        .iter()
+        .filter(|stage| stage.seconds >= 0.005)
+        .map(|stage| format!("{} {:.2}", stage.stage, stage.seconds))
+        .collect();
+    let _ = writeln!(text, "  seconds of work: {}", stages.join(", "));
+    for warning in report.warnings.iter().take(SHOWN_WARNINGS) {
+        let _ = writeln!(text, "  warning: {} ({} times)", warning.text, warning.count);
+    }
+    if report.warnings.len() > SHOWN_WARNINGS {
+        let more = report.warnings.len() - SHOWN_WARNINGS;
+        let _ = writeln!(text, "  and {more} more warnings in build.json");
+    }
+    text
+}
+
+/// After finding that nothing had changed.
+pub fn up_to_date(report: &BuildReport, out: &Path) -> String {
+    format!(
+        "{}: up to date with {} input{}, nothing done (--force builds all the same)\n",
+        out.display(),
+        report.inputs.len(),
+        if report.inputs.len() == 1 { "" } else { "s" }
+    )
+}
