@@ -174,7 +174,7 @@ fn label() -> impl Strategy<Value = NodeLabel> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(128) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(256) })]
 
     #[test]
     fn scenes_read_back_as_they_were(scene in scene()) {

@@ -106,6 +106,9 @@ impl OutputDir {
             // removed must not be lost before its successor is on the disk.
             flush(&self.partial).map_err(|error| cannot(&self.partial, "be flushed", &error))?;
         }
+        if let Ok(earlier) = fs::metadata(&self.target) {
+            drop(fs::set_permissions(&self.partial, earlier.permissions()));
+        }
         let swapped = if replaces {
             self.replace()
         } else {
