@@ -192,7 +192,7 @@ proptest! {
     fn every_scene_can_be_shown(scene in scene()) {
         let value = inspect::json(&scene);
         prop_assert_eq!(value["nodes"].as_array().unwrap().len(), scene.nodes.len());
-        prop_assert!(inspect::text(&scene, 3).lines().count() < 60 + 3 * 700);
+        prop_assert!(inspect::text(&scene, 3).lines().count() < 60 + 3 * 70);
     }
 
     #[test]

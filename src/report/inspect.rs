@@ -137,7 +137,7 @@ fn facts(out: &mut String, scene: &Scene) {
 }
 
 fn table(out: &mut String, scene: &Scene) {
-    push(out, format_args!("{:>31} {:>16} {:>28} {:>21}", "triangles", "", "", "geometric error"));
+    push(out, format_args!("{:>28} {:>59}", "triangles", "geometric error"));
     push(
         out,
         format_args!(
