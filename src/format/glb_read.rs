@@ -186,7 +186,7 @@ impl<'a> Reader<'a> {
             let long = |bytes: &[u8; 4]| u32::from_le_bytes(*bytes);
             self.read(accessor, what, Shape::Scalar, UNSIGNED_INT, long)?
         };
-        if indices.is_empty() || indices.len() % 3 != 0 {
+        if indices.is_empty() || !indices.len().is_multiple_of(3) {
             return Err(format!("expected whole triangles, found {} corners", indices.len()));
         }
         match indices.iter().find(|&&index| index as usize >= vertices) {

@@ -114,7 +114,7 @@ fn placement(mesh: &NodeMesh, up: UpAxis, label: NodeLabel) -> Result<Placement>
 fn check(primitive: &Primitive, images: usize) -> Result<(), String> {
     let Primitive { positions, texcoords, colors, indices, surface } = primitive;
     let vertices = positions.len();
-    if vertices == 0 || indices.is_empty() || indices.len() % 3 != 0 {
+    if vertices == 0 || indices.is_empty() || !indices.len().is_multiple_of(3) {
         return Err(format!("expected whole triangles, found {} corners", indices.len()));
     }
     for (name, length) in [("texture coordinates", texcoords.len()), ("colours", colors.len())] {
@@ -154,7 +154,7 @@ impl Writer {
     fn primitive(&mut self, primitive: &Primitive) -> schema::Primitive {
         let Primitive { positions, texcoords, colors, indices, surface } = primitive;
         let position = self.accessor(positions.len(), FLOAT, Shape::Vec3, |bin| {
-            positions.as_flattened().iter().for_each(|v| bin.extend_from_slice(&v.to_le_bytes()));
+            extend(bin, positions.as_flattened(), f32::to_le_bytes);
         });
         let (min, max) = positions.iter().fold(
             ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]),
@@ -169,26 +169,26 @@ impl Writer {
         self.root.accessors[position].max = Some(max);
         let texcoord = (!texcoords.is_empty()).then(|| {
             self.accessor(texcoords.len(), FLOAT, Shape::Vec2, |bin| {
-                let flat = texcoords.as_flattened();
-                flat.iter().for_each(|v| bin.extend_from_slice(&v.to_le_bytes()));
+                extend(bin, texcoords.as_flattened(), f32::to_le_bytes);
             })
         });
         let color = (!colors.is_empty()).then(|| {
             let accessor = self.accessor(colors.len(), UNSIGNED_SHORT, Shape::Vec4, |bin| {
-                let flat = colors.as_flattened();
-                flat.iter().for_each(|v| bin.extend_from_slice(&v.to_le_bytes()));
+                extend(bin, colors.as_flattened(), u16::to_le_bytes);
             });
             self.root.accessors[accessor].normalized = true;
             accessor
         });
-        let short = positions.len() <= MOST_SHORT_VERTICES;
-        let component = if short { UNSIGNED_SHORT } else { UNSIGNED_INT };
-        let indices = self.accessor(indices.len(), component, Shape::Scalar, |bin| {
-            for index in indices {
-                let bytes = index.to_le_bytes();
-                bin.extend_from_slice(if short { &bytes[..2] } else { &bytes });
-            }
-        });
+        let indices = if positions.len() <= MOST_SHORT_VERTICES {
+            let short: Vec<u16> = indices.iter().map(|&index| index as u16).collect();
+            self.accessor(short.len(), UNSIGNED_SHORT, Shape::Scalar, |bin| {
+                extend(bin, &short, u16::to_le_bytes);
+            })
+        } else {
+            self.accessor(indices.len(), UNSIGNED_INT, Shape::Scalar, |bin| {
+                extend(bin, indices, u32::to_le_bytes);
+            })
+        };
         let material = self.material(surface);
         schema::Primitive {
             attributes: Attributes { position, texcoord, color },
@@ -312,6 +312,19 @@ impl Writer {
             chunk(CHUNK_BIN, &self.bin);
         }
         Ok(out)
+    }
+}
+
+/// Appends values in little-endian order: in one copy where memory has that order already.
+fn extend<T: bytemuck::NoUninit, const N: usize>(
+    bytes: &mut Vec<u8>,
+    values: &[T],
+    little_endian: impl Fn(T) -> [u8; N],
+) {
+    if cfg!(target_endian = "little") {
+        bytes.extend_from_slice(bytemuck::cast_slice(values));
+    } else {
+        values.iter().for_each(|&value| bytes.extend_from_slice(&little_endian(value)));
     }
 }
 

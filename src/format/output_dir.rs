@@ -42,6 +42,10 @@ impl OutputDir {
         let (Some(parent), Some(name)) = (target.parent(), target.file_name()) else {
             return Err(Error::output(path, "expected a folder that has a parent; name one"));
         };
+        if is_mount_point(&target, parent) {
+            let busy = io::Error::from(ErrorKind::ResourceBusy);
+            return Err(cannot(path, "be replaced at the end", &busy));
+        }
         let made = make_folders(parent).map_err(|error| cannot(parent, "be made", &error))?;
         put_back(&target, &aside(parent, name));
         sweep(parent, name);
@@ -101,6 +105,9 @@ impl OutputDir {
             // A first result can be built again after a power failure; an earlier one that is
             // removed must not be lost before its successor is on the disk.
             flush(&self.partial).map_err(|error| cannot(&self.partial, "be flushed", &error))?;
+        }
+        if let Ok(earlier) = fs::metadata(&self.target) {
+            drop(fs::set_permissions(&self.partial, earlier.permissions()));
         }
         let swapped = if replaces {
             self.replace()
@@ -210,17 +217,11 @@ fn refuse_foreign(path: &Path, target: &Path) -> Result<()> {
         }
         Err(error) => return Err(cannot(path, "be read", &error)),
     };
-    let mut names = listing
-        .map(|entry| entry.map(|entry| entry.file_name()))
-        .collect::<io::Result<Vec<_>>>()
-        .map_err(|error| cannot(path, "be read", &error))?;
-    names.sort();
+    let names = sorted_names(listing).map_err(|error| cannot(path, "be read", &error))?;
     if names.is_empty() {
         return Ok(());
     }
-    let ours = [SCENE_FILE, NODES_DIR, TEXTURES_DIR, REPORT_FILE];
-    let foreign = names.iter().find(|name| !ours.iter().any(|ours| *name == ours));
-    let what = match foreign {
+    let what = match first_foreign(target, &names) {
         Some(name) => format!("holds {}, which is not of an earlier build", name.display()),
         None if !begins_with_magic(&target.join(SCENE_FILE)) => {
             format!("is not empty, and its {SCENE_FILE} is not of an earlier build")
@@ -228,6 +229,38 @@ fn refuse_foreign(path: &Path, target: &Path) -> Result<()> {
         None => return Ok(()),
     };
     Err(Error::output(path, format!("{what}; choose an empty or a new folder")))
+}
+
+fn sorted_names(listing: fs::ReadDir) -> io::Result<Vec<OsString>> {
+    let mut names = listing
+        .map(|entry| entry.map(|entry| entry.file_name()))
+        .collect::<io::Result<Vec<_>>>()?;
+    names.sort();
+    Ok(names)
+}
+
+/// The first thing in a folder that no build writes, relative to the folder.
+fn first_foreign(target: &Path, names: &[OsString]) -> Option<PathBuf> {
+    for name in names {
+        let kinds: &[&str] = match name.to_str() {
+            Some(SCENE_FILE | REPORT_FILE) => continue,
+            Some(NODES_DIR) => &["glb"],
+            Some(TEXTURES_DIR) => &["jpg", "png"],
+            _ => return Some(name.into()),
+        };
+        // What is not a folder, or cannot be listed, is not ours either.
+        let Ok(inner) = fs::read_dir(target.join(name)).and_then(sorted_names) else {
+            return Some(name.into());
+        };
+        let ours = |inner: &OsString| {
+            let kind = Path::new(inner).extension().unwrap_or_default();
+            kinds.iter().any(|ours| kind == *ours)
+        };
+        if let Some(inner) = inner.iter().find(|inner| !ours(inner)) {
+            return Some(Path::new(name).join(inner));
+        }
+    }
+    None
 }
 
 fn begins_with_magic(path: &Path) -> bool {
@@ -325,6 +358,21 @@ pub(super) fn cannot(path: &Path, what: &str, error: &io::Error) -> Error {
         _ => "",
     };
     Error::output(path, format!("cannot {what}: {error}{hint}"))
+}
+
+/// True where a folder is the top of another file system than its parent's.
+#[cfg(unix)]
+fn is_mount_point(folder: &Path, parent: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    match (fs::metadata(folder), fs::metadata(parent)) {
+        (Ok(folder), Ok(parent)) => folder.dev() != parent.dev(),
+        _ => false,
+    }
+}
+
+#[cfg(not(unix))]
+fn is_mount_point(_folder: &Path, _parent: &Path) -> bool {
+    false
 }
 
 /// Locks a folder for as long as the file is open; `None` where someone else has locked it or

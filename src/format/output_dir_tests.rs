@@ -117,6 +117,9 @@ fn what_is_not_ours_is_refused_and_left_alone() {
     fs::write(out.join("notes.txt"), "precious").unwrap();
     assert!(message(OutputDir::create(&out)).contains("holds notes.txt"));
     fs::remove_file(out.join("notes.txt")).unwrap();
+    fs::write(out.join("nodes/tower.blend"), "precious").unwrap();
+    assert!(message(OutputDir::create(&out)).contains("holds nodes/tower.blend"));
+    fs::remove_file(out.join("nodes/tower.blend")).unwrap();
     fs::write(out.join(SCENE_FILE), "something else").unwrap();
     assert!(message(OutputDir::create(&out)).contains("not of an earlier build"));
     fs::remove_file(out.join(SCENE_FILE)).unwrap();
@@ -158,7 +161,7 @@ fn links_are_followed_and_dangling_ones_refused() {
 #[cfg(target_os = "linux")]
 fn a_full_disk_and_a_closed_folder_say_what_to_do() {
     assert!(message(OutputDir::create(Path::new("/proc/out"))).contains("/proc"));
-    assert!(message(OutputDir::create(Path::new("/"))).contains("expected"));
+    assert!(message(OutputDir::create(Path::new("/dev"))).contains("/dev: "));
     let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let error = std::io::Write::write_all(&mut &full, b"x").unwrap_err();
     let text = super::output_dir::cannot(Path::new("out"), "be written", &error).to_string();
@@ -221,7 +224,7 @@ fn inputs_and_output_lie_apart() {
     assert!(refused(&obj, &obj).contains("is an input"));
     assert!(refused(&city.join("out"), &city).contains("lies within the input"));
     assert!(refused(&city, &obj).contains("with an input in it"));
-    assert!(refused(&city.join("none/../../city"), &city).contains("is an input"));
+    assert!(refused(&city.join("../city"), &city).contains("is an input"));
     check_apart(&dir.path().join("out"), [&city, &obj, &dir.path().join("missing")]).unwrap();
     check_apart(&city.join("out"), [&obj]).unwrap();
     check_apart(&dir.path().join("city2"), [&city]).unwrap();

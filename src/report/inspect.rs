@@ -9,8 +9,8 @@ use crate::format::{Node, SCENE_VERSION, Scene};
 
 /// Children of one node that [`text`] shows before it sums up the rest.
 const MOST_CHILDREN: usize = 8;
-/// Levels below a root that [`text`] shows before it sums up the rest.
-const MOST_LEVELS: u32 = 4;
+/// Levels below a root that [`text`] shows.
+const MOST_LEVELS: usize = 8;
 
 /// The whole scene as one object. Nodes refer to each other by `id`; `block` is an index into
 /// `blocks` and `shared_textures` of a node are indices into that of the scene.
@@ -137,11 +137,12 @@ fn facts(out: &mut String, scene: &Scene) {
 }
 
 fn table(out: &mut String, scene: &Scene) {
+    push(out, format_args!("{:>28} {:>59}", "triangles", "geometric error"));
     push(
         out,
         format_args!(
-            "level  nodes   triangles: least    mean    most      sum    texels      bytes   \
-             error median       most"
+            "{:>5} {:>6} {:>7} {:>7} {:>7} {:>8} {:>9} {:>10} {:>10} {:>10}",
+            "level", "nodes", "least", "mean", "most", "sum", "texels", "bytes", "median", "most"
         ),
     );
     for level in level_reports(scene) {
@@ -151,7 +152,7 @@ fn table(out: &mut String, scene: &Scene) {
         push(
             out,
             format_args!(
-                "{:>5} {:>6} {:>18} {:>7} {:>7} {:>8} {:>9} {:>10} {:>14} {:>10}",
+                "{:>5} {:>6} {:>7} {:>7} {:>7} {:>8} {:>9} {:>10} {:>10} {:>10}",
                 level.level,
                 level.nodes,
                 nodes().map(|node| node.triangles).min().unwrap_or(0),
@@ -167,58 +168,56 @@ fn table(out: &mut String, scene: &Scene) {
     }
 }
 
-/// One tree, indented by level, with what is too much to show summed up in place.
+/// One tree, indented by level: the way down its first children in full, the rest summed up.
 fn tree(out: &mut String, scene: &Scene, root: u32) {
     let Some(node) = scene.nodes.get(root as usize) else { return };
     match node.block.and_then(|block| scene.blocks.get(block as usize)) {
         Some(block) => push(out, format_args!("{} ({})", block.name, block.input)),
         None => push(out, format_args!("above the blocks")),
     }
-    // A stack instead of recursion: a scene may be of any depth.
-    let mut stack = vec![Entry::Node(root, 0)];
-    while let Some(entry) = stack.pop() {
-        match entry {
-            Entry::Rest { depth, nodes, triangles } => push(
-                out,
-                format_args!(
-                    "{}… {nodes} nodes more, {} triangles",
-                    "  ".repeat(depth as usize),
-                    quantity(triangles)
-                ),
-            ),
-            Entry::Node(index, depth) => {
-                let Some(node) = scene.nodes.get(index as usize) else { continue };
-                node_line(out, node, depth);
-                let children: Vec<u32> = scene.children(index).collect();
-                let shown = if depth + 1 < MOST_LEVELS { MOST_CHILDREN } else { 0 };
-                let (shown, rest) = children.split_at(children.len().min(shown));
-                if !rest.is_empty() {
-                    let (nodes, triangles) = sum_below(scene, rest);
-                    stack.push(Entry::Rest { depth: depth + 1, nodes, triangles });
-                }
-                stack.extend(shown.iter().rev().map(|&child| Entry::Node(child, depth + 1)));
-            }
+    node_line(out, scene, root, 0);
+    let mut parent = root;
+    let mut after = Vec::new();
+    for depth in 1..=MOST_LEVELS {
+        let children: Vec<u32> = scene.children(parent).collect();
+        let Some((&first, others)) = children.split_first() else { break };
+        node_line(out, scene, first, depth);
+        after.push((depth, others.to_vec()));
+        parent = first;
+    }
+    // The siblings of the way down, the deepest first, each below its own parent.
+    for (depth, others) in after.into_iter().rev() {
+        let (shown, rest) = others.split_at(others.len().min(MOST_CHILDREN - 1));
+        shown.iter().for_each(|&node| node_line(out, scene, node, depth));
+        if !rest.is_empty() {
+            let (nodes, _) = sum_below(scene, rest);
+            push(out, format_args!("{}… and {nodes} nodes more", indent(depth)));
         }
     }
 }
 
-enum Entry {
-    /// A node and its depth below the root.
-    Node(u32, u32),
-    /// What is not shown.
-    Rest { depth: u32, nodes: u64, triangles: u64 },
+fn indent(depth: usize) -> String {
+    "  ".repeat(depth)
 }
 
-fn node_line(out: &mut String, node: &Node, depth: u32) {
+/// One node, and a word on what is below it where that is not the way that is shown.
+fn node_line(out: &mut String, scene: &Scene, index: u32, depth: usize) {
+    let Some(node) = scene.nodes.get(index as usize) else { return };
     let textures = match node.texels {
         0 => String::new(),
         texels => format!(", {} texels", quantity(texels)),
     };
+    let below = match sum_below(scene, &[index]) {
+        (1, _) => String::new(),
+        (nodes, triangles) => {
+            format!(", {} nodes and {} triangles below", nodes - 1, quantity(triangles))
+        }
+    };
     push(
         out,
         format_args!(
-            "{}{}  {} triangles{textures}, {}, error {}, cost {:.1}",
-            "  ".repeat(depth as usize),
+            "{}{}: {} triangles{textures}, {}, error {}, cost {:.1}{below}",
+            indent(depth),
             node.file,
             node.triangles,
             size(node.file_bytes),
@@ -228,7 +227,7 @@ fn node_line(out: &mut String, node: &Node, depth: u32) {
     );
 }
 
-/// Number of nodes in the trees below and including `tops`, and triangles at their leaves.
+/// Number of nodes of the trees whose roots are `tops`, and triangles at their leaves.
 fn sum_below(scene: &Scene, tops: &[u32]) -> (u64, u64) {
     let (mut nodes, mut triangles) = (0, 0);
     let mut stack = tops.to_vec();
@@ -353,8 +352,9 @@ mod tests {
         }
         assert_eq!(scene.check(), []);
         let text = text(&scene, 10);
+        assert!(text.contains("1000 nodes and 900 k triangles below"));
         assert!(text.contains("  c8.glb") && !text.contains("c9.glb"));
-        assert!(text.contains("  … 992 nodes more, 893 k triangles"), "{text}");
+        assert!(text.contains("\n  … and 992 nodes more\n"), "{text}");
     }
 
     #[test]
