@@ -7,6 +7,7 @@ use super::islands::Islands;
 use super::level::LevelPicture;
 use super::pack::{self, Packing, Shape};
 use super::raster::{self, Rasterizer};
+use super::split;
 
 /// Sides of atlases are multiples of this, so that two mip levels are exact halves.
 const SIDE_MULTIPLE: usize = 4;
@@ -14,22 +15,31 @@ const SIDE_MULTIPLE: usize = 4;
 /// A lone picture whose triangles fill their bounding box to this part is cropped, not packed.
 const CROP_FILL: f64 = 0.9;
 
-/// What one atlas is made of: the level pictures and the triangles over them.
+/// An island that fills its bounding box to this part is packed as it is, else divided.
+const ISLAND_FILL: f64 = 0.8;
+
+/// What one atlas is made of.
 pub(crate) struct Sheet<'a> {
-    /// The level pictures that the triangles use; all have the same number of channels.
-    pub pictures: Vec<&'a LevelPicture>,
-    /// For each picture the corners of its triangles, in its texels and inside it, and the chart
-    /// of each.
-    pub triangles: Vec<Vec<([[f64; 2]; 3], u32)>>,
-    /// Texels per cell: a power of two. Mip levels down to one texel a cell mix no islands.
+    /// All have the same number of channels.
+    pub pictures: Vec<SheetPicture<'a>>,
+    /// Texels per cell: a power of two. Mip levels down to one texel a cell mix no patches.
     pub cell: usize,
     /// Longest side of a page.
     pub max_side: usize,
 }
 
-/// Where a chart's texels went.
+/// A level picture and the triangles over it.
+pub(crate) struct SheetPicture<'a> {
+    pub picture: &'a LevelPicture,
+    /// The corners of the triangles, in the picture's texels and inside it.
+    pub corners: Vec<[[f64; 2]; 3]>,
+    /// The chart of each triangle.
+    pub charts: Vec<u32>,
+}
+
+/// Where the texels of a patch went: triangles whose texels keep their relative places.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct ChartPlace {
+pub(crate) struct PatchPlace {
     pub page: usize,
     /// Added to a position in the level picture gives the position in the page.
     pub shift: [f64; 2],
@@ -43,11 +53,12 @@ pub(crate) struct Page {
 }
 
 /// The outcome.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Atlas {
     pub pages: Vec<Page>,
-    /// By chart; default for charts that are in no triangle of the sheet.
-    pub places: Vec<ChartPlace>,
+    pub places: Vec<PatchPlace>,
+    /// For each picture of the sheet the patch of each triangle.
+    pub patches: Vec<Vec<u32>>,
 }
 
 /// A window of a level picture, in texels.
@@ -57,34 +68,31 @@ struct Window {
     size: [usize; 2],
 }
 
-/// Cells of one picture.
-struct Cells {
-    /// First texel of the grid; a multiple of the cell.
+/// A patch to be packed: a shape of cells of one picture.
+struct Patch {
+    picture: usize,
+    /// Texel of the shape's corner; multiples of the cell.
     origin: [usize; 2],
-    islands: Islands,
+    shape: Shape,
 }
 
 impl Sheet<'_> {
     /// Packs and copies. `None` where something does not fit a page, or all does not fit
     /// `max_pages`: the caller must take coarser pictures.
-    pub fn build(&self, charts: usize, max_pages: usize) -> Option<Atlas> {
-        let boxes: Vec<UvBox> = self.triangles.iter().map(|list| bounds(list)).collect();
-        let lone = (self.pictures.len() == 1).then(|| self.window(&boxes[0])).flatten();
+    pub fn build(&self, max_pages: usize) -> Option<Atlas> {
+        let lone = match self.pictures.as_slice() {
+            [lone] => self.window(lone),
+            _ => None,
+        };
         if let Some(window) = lone {
-            let area: f64 = self.triangles[0].iter().map(|(corners, _)| area(corners)).sum();
+            let area: f64 = self.pictures[0].corners.iter().map(area).sum();
             let inner = window.size.map(|side| side.saturating_sub(2).max(1) as f64);
             if area >= CROP_FILL * inner[0] * inner[1] {
-                return Some(self.crop(window, charts));
+                return Some(self.crop(window));
             }
         }
-        let cells: Vec<Cells> = self
-            .triangles
-            .iter()
-            .zip(&boxes)
-            .map(|(list, bounds)| self.cells(list, bounds))
-            .collect();
-        let shapes: Vec<Shape> =
-            cells.iter().flat_map(|cells| cells.islands.shapes.iter().cloned()).collect();
+        let (patches, assigned) = self.patches();
+        let shapes: Vec<&Shape> = patches.iter().map(|patch| &patch.shape).collect();
         let packing = pack::pack(&shapes, (self.max_side / self.cell).max(1))
             .filter(|packing| packing.pages.len() <= max_pages);
         let packed_texels =
@@ -92,17 +100,17 @@ impl Sheet<'_> {
         if let Some(window) = lone
             && window.size[0] * window.size[1] <= packed_texels
         {
-            return Some(self.crop(window, charts));
+            return Some(self.crop(window));
         }
-        Some(self.compose(&cells, &packing?, charts))
+        Some(self.compose(&patches, &packing?, assigned))
     }
 
     /// The window that holds all triangles' texels, if it fits a page.
-    fn window(&self, bounds: &UvBox) -> Option<Window> {
-        let picture = self.pictures[0];
+    fn window(&self, lone: &SheetPicture) -> Option<Window> {
+        let bounds = bounds(&lone.corners);
         let mut window = Window { origin: [0; 2], size: [0; 2] };
         for axis in 0..2 {
-            let side = picture.size[axis];
+            let side = lone.picture.size[axis];
             let (start, end) = raster::touched(bounds.min[axis], bounds.max[axis], side);
             let size = (end.saturating_sub(start)).max(1).next_multiple_of(SIDE_MULTIPLE);
             if size > self.max_side {
@@ -115,46 +123,114 @@ impl Sheet<'_> {
         Some(window)
     }
 
-    fn crop(&self, window: Window, charts: usize) -> Atlas {
-        let picture = self.pictures[0];
-        let mut page = Page::new(window.size, picture.channels);
-        page.copy(picture, window, [0; 2]);
+    fn crop(&self, window: Window) -> Atlas {
+        let lone = &self.pictures[0];
+        let mut page = Page::new(window.size, lone.picture.channels);
+        page.copy(lone.picture, window, [0; 2]);
         let shift = window.origin.map(|start| -(start as f64));
-        Atlas { pages: vec![page], places: vec![ChartPlace { page: 0, shift }; charts] }
+        Atlas {
+            pages: vec![page],
+            places: vec![PatchPlace { page: 0, shift }],
+            patches: vec![vec![0; lone.corners.len()]],
+        }
     }
 
-    /// The cells that a picture's triangles use.
-    fn cells(&self, triangles: &[([[f64; 2]; 3], u32)], bounds: &UvBox) -> Cells {
-        let cell = self.cell as f64;
-        let mut origin = [0; 2];
+    /// Divides all triangles into patches; also returns the patch of each triangle.
+    fn patches(&self) -> (Vec<Patch>, Vec<Vec<u32>>) {
+        let mut patches = Vec::new();
+        let mut assigned = Vec::new();
+        for (index, picture) in self.pictures.iter().enumerate() {
+            let all: Vec<u32> = (0..picture.corners.len() as u32).collect();
+            let (origin, grid) = self.cells(picture, &all);
+            let islands = Islands::find(&grid);
+            let members = self.members(picture, origin, &islands);
+            let mut patch_of = vec![0; picture.corners.len()];
+            let parts = islands.shapes.into_iter().zip(islands.origins).zip(members);
+            for ((shape, start), members) in parts {
+                let fill = shape.area() as f64 / (shape.size[0] * shape.size[1]) as f64;
+                let parts = if fill < ISLAND_FILL {
+                    split::split(&picture.corners, members, 1.5 * self.cell as f64)
+                } else {
+                    vec![members]
+                };
+                let whole = parts.len() == 1;
+                for part in &parts {
+                    part.iter().for_each(|t| patch_of[*t as usize] = patches.len() as u32);
+                    if !whole {
+                        let (origin, grid) = self.cells(picture, part);
+                        let shape = Shape::of(&grid);
+                        patches.push(Patch { picture: index, origin, shape });
+                    }
+                }
+                if whole {
+                    let origin = [0, 1].map(|axis| origin[axis] + start[axis] * self.cell);
+                    patches.push(Patch { picture: index, origin, shape });
+                }
+            }
+            assigned.push(patch_of);
+        }
+        (patches, assigned)
+    }
+
+    /// The cells that triangles of a picture use, and the texel where their grid begins.
+    fn cells(&self, picture: &SheetPicture, triangles: &[u32]) -> ([usize; 2], BitGrid) {
+        let scale = 1.0 / self.cell as f64;
+        let mut bounds = UvBox::EMPTY;
+        for triangle in triangles {
+            picture.corners[*triangle as usize].iter().for_each(|corner| bounds.add(*corner));
+        }
+        let mut first = [0; 2];
         let mut size = [0; 2];
         for axis in 0..2 {
-            let (start, end) =
-                raster::touched(bounds.min[axis] / cell, bounds.max[axis] / cell, usize::MAX >> 16);
-            origin[axis] = start * self.cell;
+            // Cells that begin beyond the picture have no texels of their own.
+            let count = picture.picture.size[axis].div_ceil(self.cell);
+            let (low, high) = (bounds.min[axis] * scale, bounds.max[axis] * scale);
+            let (start, end) = raster::touched(low, high, count);
+            first[axis] = start.min(count - 1);
             size[axis] = end.saturating_sub(start).max(1);
         }
         let mut grid = BitGrid::new(size[0], size[1]);
         let mut rasterizer = Rasterizer::default();
-        for (corners, _) in triangles {
-            let corners = corners
-                .map(|at| [(at[0] - origin[0] as f64) / cell, (at[1] - origin[1] as f64) / cell]);
+        let start = first.map(|cell| cell as f64);
+        for triangle in triangles {
+            let corners = picture.corners[*triangle as usize]
+                .map(|at| [at[0] * scale - start[0], at[1] * scale - start[1]]);
             rasterizer.mark(corners, &mut grid);
         }
-        Cells { origin, islands: Islands::find(&grid) }
+        (first.map(|cell| cell * self.cell), grid)
     }
 
-    fn compose(&self, cells: &[Cells], packing: &Packing, charts: usize) -> Atlas {
-        let channels = self.pictures.first().map_or(3, |picture| picture.channels);
-        let mut pages: Vec<Page> = packing
-            .pages
-            .iter()
-            .map(|size| {
-                let side =
-                    |cells: usize| (cells * self.cell).max(1).next_multiple_of(SIDE_MULTIPLE);
-                Page::new(size.map(side), channels)
-            })
-            .collect();
+    /// The triangles of each island. A chart lies in one island, so its first triangle tells.
+    fn members(
+        &self,
+        picture: &SheetPicture,
+        origin: [usize; 2],
+        islands: &Islands,
+    ) -> Vec<Vec<u32>> {
+        let mut members = vec![Vec::new(); islands.shapes.len()];
+        let charts = picture.charts.iter().max().map_or(0, |chart| *chart as usize + 1);
+        let mut island_of = vec![None; charts];
+        for (triangle, chart) in picture.charts.iter().enumerate() {
+            let island = *island_of[*chart as usize].get_or_insert_with(|| {
+                let corner = picture.corners[triangle][0];
+                let cell = [0, 1].map(|axis| {
+                    let texel = corner[axis].min(picture.picture.size[axis] as f64 - 0.5);
+                    ((texel - origin[axis] as f64).max(0.0) as usize) / self.cell
+                });
+                islands.at(cell[0], cell[1]).unwrap_or(0)
+            });
+            if let Some(members) = members.get_mut(island) {
+                members.push(triangle as u32);
+            }
+        }
+        members
+    }
+
+    fn compose(&self, patches: &[Patch], packing: &Packing, assigned: Vec<Vec<u32>>) -> Atlas {
+        let channels = self.pictures.first().map_or(3, |picture| picture.picture.channels);
+        let side = |cells: usize| (cells * self.cell).max(1).next_multiple_of(SIDE_MULTIPLE);
+        let mut pages: Vec<Page> =
+            packing.pages.iter().map(|size| Page::new(size.map(side), channels)).collect();
         let mut owned: Vec<BitGrid> = pages
             .iter()
             .map(|page| {
@@ -162,67 +238,31 @@ impl Sheet<'_> {
                 BitGrid::new(width, height)
             })
             .collect();
-        let mut places = vec![ChartPlace::default(); charts];
-        let mut first = 0;
-        for (index, cells) in cells.iter().enumerate() {
-            let placements = &packing.placements[first..first + cells.islands.shapes.len()];
-            first += placements.len();
-            for (island, placement) in placements.iter().enumerate() {
-                let shape = &cells.islands.shapes[island];
-                let start = cells.islands.origins[island];
-                for [row, from, to] in &shape.runs {
-                    let (row, from, to) = (*row as usize, *from as usize, *to as usize);
-                    let origin = [
-                        cells.origin[0] + (start[0] + from) * self.cell,
-                        cells.origin[1] + (start[1] + row) * self.cell,
-                    ];
-                    let size = [(to - from) * self.cell, self.cell];
-                    let target = [placement.x + from, placement.y + row];
-                    owned[placement.page].set_span(target[1], target[0], target[0] + to - from);
-                    pages[placement.page].copy(
-                        self.pictures[index],
-                        Window { origin, size },
-                        target.map(|cell| cell * self.cell),
-                    );
-                }
+        let mut places = Vec::with_capacity(patches.len());
+        for (patch, placement) in patches.iter().zip(&packing.placements) {
+            let page = &mut pages[placement.page];
+            for [row, from, to] in &patch.shape.runs {
+                let (row, from, to) = (*row as usize, *from as usize, *to as usize);
+                let window = Window {
+                    origin: [patch.origin[0] + from * self.cell, patch.origin[1] + row * self.cell],
+                    size: [(to - from) * self.cell, self.cell],
+                };
+                let target = [placement.x + from, placement.y + row];
+                owned[placement.page].set_span(target[1], target[0], target[0] + to - from);
+                let picture = self.pictures[patch.picture].picture;
+                page.copy(picture, window, target.map(|cell| cell * self.cell));
             }
-            self.place_charts(index, cells, placements, &mut places);
+            let target = [placement.x, placement.y];
+            places.push(PatchPlace {
+                page: placement.page,
+                shift: [0, 1]
+                    .map(|axis| (target[axis] * self.cell) as f64 - patch.origin[axis] as f64),
+            });
         }
         for (page, owned) in pages.iter_mut().zip(&owned) {
             page.fill_empty_cells(owned, self.cell);
         }
-        Atlas { pages, places }
-    }
-
-    /// Finds the island of each chart by its first triangle.
-    fn place_charts(
-        &self,
-        picture: usize,
-        cells: &Cells,
-        placements: &[pack::Placement],
-        places: &mut [ChartPlace],
-    ) {
-        let mut done = vec![false; places.len()];
-        for (corners, chart) in &self.triangles[picture] {
-            let chart = *chart as usize;
-            if std::mem::replace(&mut done[chart], true) {
-                continue;
-            }
-            let cell = [0, 1].map(|axis| {
-                ((corners[0][axis] - cells.origin[axis] as f64).max(0.0) as usize) / self.cell
-            });
-            let Some(island) = cells.islands.at(cell[0], cell[1]) else { continue };
-            let placement = placements[island];
-            let start = cells.islands.origins[island];
-            let target = [placement.x, placement.y];
-            places[chart] = ChartPlace {
-                page: placement.page,
-                shift: [0, 1].map(|axis| {
-                    (target[axis] * self.cell) as f64
-                        - (cells.origin[axis] + start[axis] * self.cell) as f64
-                }),
-            };
-        }
+        Atlas { pages, places, patches: assigned }
     }
 }
 
@@ -289,9 +329,9 @@ impl Page {
     }
 }
 
-fn bounds(triangles: &[([[f64; 2]; 3], u32)]) -> UvBox {
+fn bounds(triangles: &[[[f64; 2]; 3]]) -> UvBox {
     let mut bounds = UvBox::EMPTY;
-    for corner in triangles.iter().flat_map(|(corners, _)| corners) {
+    for corner in triangles.iter().flatten() {
         bounds.add(*corner);
     }
     bounds

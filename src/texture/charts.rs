@@ -34,6 +34,13 @@ impl UvBox {
         }
     }
 
+    pub fn unite(&mut self, other: &UvBox) {
+        for axis in 0..2 {
+            self.min[axis] = self.min[axis].min(other.min[axis]);
+            self.max[axis] = self.max[axis].max(other.max[axis]);
+        }
+    }
+
     /// The whole tiles by which the chart is moved so that it lies in 0–1, where it can.
     pub fn tile(&self, axis: usize) -> f64 {
         let (min, max) = (self.min[axis], self.max[axis]);

@@ -27,6 +27,7 @@ mod plan;
 mod raster;
 mod scale;
 mod shared;
+mod split;
 mod srgb;
 #[cfg(test)]
 mod survey;

@@ -3,7 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use super::atlas::{Page, Sheet};
+use rustc_hash::FxHashMap;
+
+use super::atlas::{Atlas, Page, Sheet, SheetPicture};
 use super::block::{BlockTextures, Prepared};
 use super::charts::{self, Charts, NO_CHART};
 use super::encode;
@@ -13,8 +15,8 @@ use crate::mesh::{AlphaMode, Mesh, Warnings, Wrap};
 use crate::{Error, Result};
 
 /// Texels per cell of an atlas of a node that has a parent: that one replaces it once a texel is
-/// about half a pixel, so mip levels 1 and 2 are enough.
-const CELL: usize = 4;
+/// about half a pixel, so mip level 1 must be free of neighbours.
+const CELL: usize = 2;
 
 /// Texels per cell of a root's atlas: nothing coarser replaces it.
 const ROOT_CELL: usize = 8;
@@ -30,32 +32,35 @@ pub struct TexturedNode {
     pub warnings: Warnings,
 }
 
-/// Where the texture coordinates of a chart go, and in which picture they then are.
+/// From a chart's texture coordinates to a position in its level picture:
+/// `clamp(uv · scale − offset)`, clamped to the picture where it has a limit.
 #[derive(Clone, Copy, Debug)]
 struct Mapping {
-    image: usize,
-    /// `(clamp(uv · scale − offset) + shift) · unit`.
     scale: [f64; 2],
     offset: [f64; 2],
     limit: [f64; 2],
+}
+
+impl Mapping {
+    fn texel(&self, uv: [f32; 2]) -> [f64; 2] {
+        let uv = charts::sane(uv);
+        [0, 1].map(|axis| {
+            let texel = uv[axis] * self.scale[axis] - self.offset[axis];
+            if self.limit[axis].is_finite() { texel.clamp(0.0, self.limit[axis]) } else { texel }
+        })
+    }
+}
+
+/// From a position in a level picture to a texture coordinate of an image: `(texel + shift) · unit`.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    image: usize,
     shift: [f64; 2],
     unit: [f64; 2],
 }
 
-impl Mapping {
-    /// The position in the level picture.
-    fn texel(&self, uv: [f32; 2]) -> [f64; 2] {
-        let uv = charts::sane(uv);
-        [0, 1].map(|axis| {
-            (uv[axis] * self.scale[axis] - self.offset[axis]).clamp(0.0, self.limit[axis])
-        })
-    }
-
-    fn apply(&self, uv: [f32; 2]) -> [f32; 2] {
-        let texel = self.texel(uv);
-        [0, 1].map(|axis| ((texel[axis] + self.shift[axis]) * self.unit[axis]) as f32)
-    }
-}
+/// The place of triangles without texture.
+const NO_PLACE: u32 = u32::MAX;
 
 /// What primitives are told apart by, besides their image.
 type LookKey = (u8, u32, bool);
@@ -63,7 +68,8 @@ type LookKey = (u8, u32, bool);
 /// The triangles of one primitive.
 struct Group {
     image: Option<usize>,
-    vertices: Vec<u32>,
+    /// Vertices of the mesh and the place of their texels.
+    vertices: Vec<(u32, u32)>,
     indices: Vec<u32>,
     /// Materials in order of first use.
     materials: Vec<u32>,
@@ -102,6 +108,28 @@ impl BlockTextures<'_> {
     }
 }
 
+/// The vertices that primitives have so far: one of the mesh becomes two where its triangles'
+/// texels went to different places.
+struct Slots {
+    /// By vertex: the place it was first met with and its slot.
+    first: Vec<Option<(u32, u32)>>,
+    others: FxHashMap<(u32, u32), u32>,
+}
+
+impl Slots {
+    fn new(vertices: usize) -> Self {
+        Self { first: vec![None; vertices], others: FxHashMap::default() }
+    }
+
+    fn get(&mut self, vertex: u32, place: u32, add: impl FnOnce() -> u32) -> u32 {
+        match &mut self.first[vertex as usize] {
+            Some((same, slot)) if *same == place => *slot,
+            Some(_) => *self.others.entry((vertex, place)).or_insert_with(add),
+            empty => empty.insert((place, add())).1,
+        }
+    }
+}
+
 struct NodeBuilder<'a> {
     block: &'a BlockTextures<'a>,
     mesh: &'a Mesh,
@@ -111,6 +139,9 @@ struct NodeBuilder<'a> {
     chart_textures: Vec<u32>,
     /// By chart; `None` until its picture is made.
     mappings: Vec<Option<Mapping>>,
+    /// By triangle: index into `places`, or [`NO_PLACE`].
+    place_of: Vec<u32>,
+    places: Vec<Place>,
     images: Vec<NodeImage>,
     warnings: Warnings,
 }
@@ -124,6 +155,8 @@ impl<'a> NodeBuilder<'a> {
             charts: Charts::default(),
             chart_textures: Vec::new(),
             mappings: Vec::new(),
+            place_of: vec![NO_PLACE; mesh.triangles.len()],
+            places: Vec::new(),
             images: Vec::new(),
             warnings: Warnings::default(),
         }
@@ -202,32 +235,21 @@ impl<'a> NodeBuilder<'a> {
                 coarser.iter().collect()
             };
             let mappings = self.texel_mappings(&pictures, &levels);
+            let (sheet_pictures, members) = self.sheet_pictures(&pictures, &levels, &mappings);
             let sheet = Sheet {
-                triangles: self.sheet_triangles(&pictures, &mappings),
-                pictures: levels,
-                cell: if self.level == 0 { ROOT_CELL } else { CELL },
+                pictures: sheet_pictures,
+                cell: if self.level == 0 && !is_leaf { ROOT_CELL } else { CELL },
                 max_side,
             };
             let max_pages = if is_leaf && halvings == 0 { usize::MAX } else { 1 };
-            if let Some(atlas) = sheet.build(self.charts.boxes.len(), max_pages) {
-                let first = self.images.len();
-                for (chart, mapping) in mappings.into_iter().enumerate() {
-                    let Some(mut mapping) = mapping else { continue };
-                    let place = atlas.places[chart];
-                    mapping.image = first + place.page;
-                    mapping.shift = place.shift;
-                    mapping.unit = atlas.pages[place.page].size.map(|side| 1.0 / side as f64);
-                    self.mappings[chart] = Some(mapping);
-                }
-                for page in &atlas.pages {
-                    self.images.push(self.encode(page, channels)?);
-                }
+            if let Some(atlas) = sheet.build(max_pages) {
+                self.take_atlas(&atlas, &mappings, &members, channels)?;
                 break;
             }
-            if sheet.pictures.iter().all(|picture| picture.size == [1, 1]) {
+            if levels.iter().all(|picture| picture.size == [1, 1]) {
                 return Err(Error::Internal(format!("no atlas of {max_side} texels a side")));
             }
-            coarser = sheet.pictures.iter().map(|picture| picture.halved()).collect();
+            coarser = levels.iter().map(|picture| picture.halved()).collect();
             halvings += 1;
         }
         if halvings > 0 {
@@ -263,34 +285,72 @@ impl<'a> NodeBuilder<'a> {
                 return None;
             };
             Some(Mapping {
-                image: 0,
                 scale: source.size.map(|side| side / level.step),
                 offset: [0, 1].map(|axis| {
                     (source.tile(bounds, axis) * source.size[axis] + source.origin[axis])
                         / level.step
                 }),
                 limit: level.size.map(|side| side as f64),
-                shift: [0.0; 2],
-                unit: [1.0; 2],
             })
         };
         self.charts.boxes.iter().zip(&self.chart_textures).map(mapping).collect()
     }
 
-    fn sheet_triangles(
+    /// The sheet's pictures with their triangles, and which triangles of the mesh those are.
+    fn sheet_pictures<'p>(
         &self,
         pictures: &BTreeMap<u32, usize>,
+        levels: &[&'p LevelPicture],
         mappings: &[Option<Mapping>],
-    ) -> Vec<Vec<([[f64; 2]; 3], u32)>> {
-        let mut lists = vec![Vec::new(); pictures.len()];
-        for triangle in &self.mesh.triangles {
+    ) -> (Vec<SheetPicture<'p>>, Vec<Vec<u32>>) {
+        let mut members = vec![Vec::new(); levels.len()];
+        let empty = |picture: &&'p LevelPicture| SheetPicture {
+            picture,
+            corners: Vec::new(),
+            charts: Vec::new(),
+        };
+        let mut lists: Vec<SheetPicture> = levels.iter().map(empty).collect();
+        for (index, triangle) in self.mesh.triangles.iter().enumerate() {
             let Some(chart) = self.chart_of(*triangle) else { continue };
             let Some(mapping) = &mappings[chart] else { continue };
-            let corners =
-                triangle.map(|vertex| mapping.texel(self.mesh.texcoords[vertex as usize]));
-            lists[pictures[&self.chart_textures[chart]]].push((corners, chart as u32));
+            let Some(picture) = pictures.get(&self.chart_textures[chart]) else { continue };
+            let list = &mut lists[*picture];
+            let texel = |vertex: u32| mapping.texel(self.mesh.texcoords[vertex as usize]);
+            list.corners.push(triangle.map(texel));
+            list.charts.push(chart as u32);
+            members[*picture].push(index as u32);
         }
-        lists
+        (lists, members)
+    }
+
+    /// Takes over where the triangles' texels went, and encodes the pages.
+    fn take_atlas(
+        &mut self,
+        atlas: &Atlas,
+        mappings: &[Option<Mapping>],
+        members: &[Vec<u32>],
+        channels: usize,
+    ) -> Result<()> {
+        let first_image = self.images.len();
+        let first_place = self.places.len() as u32;
+        self.places.extend(atlas.places.iter().map(|place| Place {
+            image: first_image + place.page,
+            shift: place.shift,
+            unit: atlas.pages[place.page].size.map(|side| 1.0 / side as f64),
+        }));
+        for (members, patches) in members.iter().zip(&atlas.patches) {
+            for (triangle, patch) in members.iter().zip(patches) {
+                self.place_of[*triangle as usize] = first_place + patch;
+            }
+        }
+        for (own, mapping) in self.mappings.iter_mut().zip(mappings) {
+            *own = own.or(*mapping);
+        }
+        for page in &atlas.pages {
+            let image = self.encode(page, channels)?;
+            self.images.push(image);
+        }
+        Ok(())
     }
 
     fn encode(&self, page: &Page, channels: usize) -> Result<NodeImage> {
@@ -305,60 +365,58 @@ impl<'a> NodeBuilder<'a> {
 
     /// Finds the shared pictures of the charts that repeat.
     fn find_shared(&mut self) -> Result<()> {
+        // By material, as the wrapping is the material's.
+        let mut places: BTreeMap<u32, u32> = BTreeMap::new();
         let mut images: BTreeMap<u32, usize> = BTreeMap::new();
-        for chart in 0..self.charts.boxes.len() {
+        for (index, triangle) in self.mesh.triangles.iter().enumerate() {
+            let Some(chart) = self.chart_of(*triangle) else { continue };
             let texture = self.chart_textures[chart];
             let Prepared::Repeating(decoded) = &self.block.textures[texture as usize] else {
                 continue;
             };
-            let image = match images.get(&texture) {
-                Some(image) => *image,
+            let material = self.mesh.triangle_material(*triangle);
+            let place = match places.get(&material) {
+                Some(place) => *place,
                 None => {
-                    self.images.push(self.block.shared.image(
-                        &self.block.model.textures[texture as usize].name,
-                        decoded,
-                        self.block.steps[self.level],
-                        self.block.options.jpeg_quality,
-                    )?);
-                    images.insert(texture, self.images.len() - 1);
-                    self.images.len() - 1
+                    let image = match images.get(&texture) {
+                        Some(image) => *image,
+                        None => {
+                            self.images.push(self.block.shared.image(
+                                &self.block.model.textures[texture as usize].name,
+                                decoded,
+                                self.block.steps[self.level],
+                                self.block.options.jpeg_quality,
+                            )?);
+                            images.insert(texture, self.images.len() - 1);
+                            self.images.len() - 1
+                        }
+                    };
+                    self.places.push(Place { image, shift: [0.0; 2], unit: [1.0; 2] });
+                    places.insert(material, self.places.len() as u32 - 1);
+                    self.places.len() as u32 - 1
                 }
             };
-            self.mappings[chart] = Some(Mapping {
-                image,
-                scale: [1.0; 2],
-                offset: [0.0; 2],
-                limit: [f64::MAX; 2],
-                shift: [0.0; 2],
-                unit: [1.0; 2],
-            });
-        }
-        // Coordinates are kept, moved by whole periods to where f32 is finest.
-        for (vertex, chart) in self.charts.of_vertex.iter().enumerate() {
-            if *chart == NO_CHART {
-                continue;
-            }
-            let chart = *chart as usize;
-            let Some(mapping) = &mut self.mappings[chart] else { continue };
-            if mapping.limit != [f64::MAX; 2] {
-                continue;
-            }
-            let wrap = self.block.model.materials[self.mesh.materials[vertex] as usize].wrap;
-            let bounds = &self.charts.boxes[chart];
-            for axis in 0..2 {
-                let period = match wrap[axis] {
-                    Wrap::Repeat => bounds.min[axis].floor(),
-                    Wrap::Mirror => 2.0 * (bounds.min[axis] / 2.0).floor(),
-                    Wrap::Clamp => 0.0,
-                };
-                // The clamp at 0 is for atlases; here the range is moved above it and back.
-                let base =
-                    if wrap[axis] == Wrap::Clamp { bounds.min[axis].floor() } else { period };
-                mapping.offset[axis] = base;
-                mapping.shift[axis] = base - period;
+            self.place_of[index] = place;
+            if self.mappings[chart].is_none() {
+                self.mappings[chart] = Some(self.repeating_mapping(chart, material));
             }
         }
         Ok(())
+    }
+
+    /// Coordinates are kept, moved by whole periods to where f32 is finest.
+    fn repeating_mapping(&self, chart: usize, material: u32) -> Mapping {
+        let material = self.block.model.materials.get(material as usize);
+        let wrap = material.map_or([Wrap::Repeat; 2], |material| material.wrap);
+        let low = self.charts.boxes[chart].min;
+        let offset = [0, 1].map(|axis| match wrap[axis] {
+            Wrap::Repeat => low[axis].floor(),
+            Wrap::Mirror => 2.0 * (low[axis] / 2.0).floor(),
+            Wrap::Clamp => 0.0,
+        });
+        // What lies below 0 is only ever met with `Clamp`, where it looks like 0; but moving a
+        // corner would stretch the triangle's texture, so nothing is cut off.
+        Mapping { scale: [1.0; 2], offset, limit: [f64::INFINITY; 2] }
     }
 
     /// Groups the triangles by how they look.
@@ -366,11 +424,10 @@ impl<'a> NodeBuilder<'a> {
         let mut groups: Vec<Group> = Vec::new();
         let mut by_look: BTreeMap<(Option<usize>, [u8; 2], LookKey), usize> = BTreeMap::new();
         let mut last: Option<(u32, Option<usize>, usize)> = None;
-        let mut remap = vec![u32::MAX; self.mesh.positions.len()];
-        for triangle in &self.mesh.triangles {
+        let mut slots = Slots::new(self.mesh.positions.len());
+        for (triangle, place) in self.mesh.triangles.iter().zip(&self.place_of) {
             let material = self.mesh.triangle_material(*triangle);
-            let image =
-                self.chart_of(*triangle).and_then(|chart| self.mappings[chart]).map(|m| m.image);
+            let image = self.places.get(*place as usize).map(|place| place.image);
             let index = match last {
                 Some((same, picture, index)) if same == material && picture == image => index,
                 _ => {
@@ -393,12 +450,11 @@ impl<'a> NodeBuilder<'a> {
             };
             let group = &mut groups[index];
             for vertex in triangle {
-                let slot = &mut remap[*vertex as usize];
-                if *slot == u32::MAX {
-                    *slot = group.vertices.len() as u32;
-                    group.vertices.push(*vertex);
-                }
-                group.indices.push(*slot);
+                let slot = slots.get(*vertex, *place, || {
+                    group.vertices.push((*vertex, *place));
+                    group.vertices.len() as u32 - 1
+                });
+                group.indices.push(slot);
             }
         }
         groups.into_iter().map(|group| self.primitive(group)).collect()
@@ -446,16 +502,22 @@ impl<'a> NodeBuilder<'a> {
             Some(_) => group
                 .vertices
                 .iter()
-                .map(|vertex| {
-                    let chart = self.charts.of_vertex[*vertex as usize] as usize;
+                .map(|(vertex, place)| {
                     let uv = mesh.texcoords[*vertex as usize];
-                    self.mappings[chart].map_or(uv, |mapping| mapping.apply(uv))
+                    let chart = self.charts.of_vertex[*vertex as usize] as usize;
+                    let mapping = self.mappings.get(chart).copied().flatten();
+                    let (Some(mapping), Some(place)) = (mapping, self.places.get(*place as usize))
+                    else {
+                        return uv;
+                    };
+                    let texel = mapping.texel(uv);
+                    [0, 1].map(|axis| ((texel[axis] + place.shift[axis]) * place.unit[axis]) as f32)
                 })
                 .collect(),
         };
         let source = self.block.model.materials.get(first as usize);
         Primitive {
-            positions: group.vertices.iter().map(|v| mesh.positions[*v as usize]).collect(),
+            positions: group.vertices.iter().map(|(v, _)| mesh.positions[*v as usize]).collect(),
             texcoords,
             colors,
             surface: Surface {
@@ -477,14 +539,17 @@ impl<'a> NodeBuilder<'a> {
         let uniform = factors.iter().all(|factor| *factor == base);
         let color =
             |vertex: u32| mesh.colors.get(vertex as usize).copied().unwrap_or([u16::MAX; 4]);
-        let white =
-            mesh.colors.is_empty() || group.vertices.iter().all(|v| color(*v) == [u16::MAX; 4]);
+        let white = mesh.colors.is_empty()
+            || group.vertices.iter().all(|(v, _)| color(*v) == [u16::MAX; 4]);
         if uniform {
-            let colors =
-                if white { Vec::new() } else { group.vertices.iter().map(|v| color(*v)).collect() };
+            let colors = if white {
+                Vec::new()
+            } else {
+                group.vertices.iter().map(|(v, _)| color(*v)).collect()
+            };
             return (colors, base);
         }
-        let colors = group.vertices.iter().map(|vertex| {
+        let colors = group.vertices.iter().map(|(vertex, _)| {
             let factor = self.base_color(mesh.materials[*vertex as usize]);
             let own = color(*vertex);
             std::array::from_fn(|channel| {

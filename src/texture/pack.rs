@@ -3,6 +3,8 @@
 //! Shapes are placed largest first at the lowest, then leftmost place where they fit (as xatlas
 //! does by brute force); all places of a row are tried at once, 64 to a machine word.
 
+use super::bits::BitGrid;
+
 /// A shape on the cell grid: rows of runs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Shape {
@@ -13,6 +15,14 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
+    /// The shape of a grid's set cells; empty rows and columns around them stay.
+    pub fn of(grid: &BitGrid) -> Self {
+        let runs = (0..grid.height())
+            .flat_map(|y| grid.runs(y).map(move |(from, to)| [y as u32, from as u32, to as u32]))
+            .collect();
+        Self { size: [grid.width(), grid.height()], runs }
+    }
+
     /// The number of cells.
     pub fn area(&self) -> usize {
         self.runs.iter().map(|[_, start, end]| (end - start) as usize).sum()
@@ -76,7 +86,7 @@ const WIDTHS: [f64; 6] = [0.92, 1.0, 1.04, 1.08, 1.16, 1.3];
 
 /// Packs shapes into pages of at most `max` cells a side; one page where they fit, as near to a
 /// square as wastes least. `None` where a shape is larger than a page.
-pub(crate) fn pack(shapes: &[Shape], max: usize) -> Option<Packing> {
+pub(crate) fn pack(shapes: &[&Shape], max: usize) -> Option<Packing> {
     let widest = shapes.iter().map(|shape| shape.size[0]).max().unwrap_or(1);
     let tallest = shapes.iter().map(|shape| shape.size[1]).max().unwrap_or(1);
     if widest > max || tallest > max {
@@ -86,7 +96,7 @@ pub(crate) fn pack(shapes: &[Shape], max: usize) -> Option<Packing> {
         let placements = vec![Placement { page: 0, x: 0, y: 0 }];
         return Some(Packing { placements, pages: vec![shape.size] });
     }
-    let area: usize = shapes.iter().map(Shape::area).sum();
+    let area: usize = shapes.iter().map(|shape| shape.area()).sum();
     let side = (area as f64).sqrt();
     let mut factor = 1;
     while (side / factor as f64) > MAX_COLUMNS as f64 {
@@ -332,6 +342,10 @@ mod tests {
         Shape { size: [size as usize; 2], runs }
     }
 
+    fn refs(shapes: &[Shape]) -> Vec<&Shape> {
+        shapes.iter().collect()
+    }
+
     fn check(shapes: &[Shape], packing: &Packing, max: usize) {
         let mut pages: Vec<Vec<bool>> =
             packing.pages.iter().map(|[w, h]| vec![false; w * h]).collect();
@@ -365,7 +379,7 @@ mod tests {
                 })
                 .collect();
             let max = if round % 2 == 0 { 4096 } else { 100 };
-            check(&shapes, &pack(&shapes, max).expect("fits"), max);
+            check(&shapes, &pack(&refs(&shapes), max).expect("fits"), max);
         }
     }
 
@@ -373,7 +387,7 @@ mod tests {
     fn shapes_nest_where_boxes_would_not() {
         // Two corners fill a rectangle with a block in their notches.
         let shapes = [corner(8), block(4, 4), corner(8), block(4, 4)];
-        let packing = pack(&shapes, 64).expect("fits");
+        let packing = pack(&refs(&shapes), 64).expect("fits");
         check(&shapes, &packing, 64);
         assert!(packing.area() <= 8 * 16 + 16, "{:?}", packing.pages);
     }
@@ -381,13 +395,13 @@ mod tests {
     #[test]
     fn large_sets_go_to_a_coarser_grid_and_several_pages() {
         let shapes: Vec<Shape> = (0..60).map(|i| block(150 + i, 130 + i)).collect();
-        let one = pack(&shapes, 4096).expect("fits");
+        let one = pack(&refs(&shapes), 4096).expect("fits");
         check(&shapes, &one, 4096);
         assert_eq!(one.pages.len(), 1);
-        let many = pack(&shapes, 400).expect("fits");
+        let many = pack(&refs(&shapes), 400).expect("fits");
         check(&shapes, &many, 400);
         assert!(many.pages.len() > 10);
-        assert_eq!(pack(&shapes, 200), None);
+        assert_eq!(pack(&refs(&shapes), 200), None);
     }
 
     #[test]
