@@ -237,7 +237,7 @@ impl Bar {
                     "rate",
                     |state: &indicatif::ProgressState, out: &mut dyn std::fmt::Write| {
                         let rate = HumanCount(state.per_sec() as u64);
-                        drop(write!(out, "{rate} triangles/s"));
+                        let _ = write!(out, "{rate} triangles/s");
                     },
                 ));
             }
