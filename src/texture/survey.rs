@@ -121,7 +121,7 @@ fn survey() {
         *last = 1.0;
     }
     let shared = SharedTextures::new();
-    let cache = TextureCache::new(&model, &plan, [0..model.materials.len() as u32]);
+    let cache = TextureCache::new(&model, &plan, std::iter::once(0..model.materials.len() as u32));
     let start = Instant::now();
     for texture in &model.textures {
         decode_texture(texture).expect("decodes");
