@@ -6,50 +6,61 @@
 //! samples may miss is covered by [`SAMPLING_ALLOWANCE`].
 
 use glam::Vec3;
+use rustc_hash::FxHashSet;
 
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, PositionKey, key};
 
 /// The measured distance is multiplied by this, since the farthest point of a surface need not be
 /// one of the samples.
-pub const SAMPLING_ALLOWANCE: f64 = 1.25;
+pub const SAMPLING_ALLOWANCE: f64 = 1.5;
+
+/// Points that are tried in each direction; evenly spread over the vertices in question.
+const MOST_SAMPLES: usize = 320;
 
 /// The two-sided distance between two meshes over the same surface, metres.
 pub fn hausdorff(source: &Mesh, simplified: &Mesh) -> f64 {
     if source.triangles.is_empty() || simplified.triangles.is_empty() {
         return 0.0;
     }
-    let to_simplified = TriangleGrid::new(simplified);
-    let mut worst = 0f32;
-    for &position in &source.positions {
-        worst = worst.max(to_simplified.distance_beyond(position.into(), worst));
+    // A vertex that both have is at no distance.
+    let kept: FxHashSet<PositionKey<f32>> =
+        simplified.positions.iter().map(|&position| key(position)).collect();
+    let gone: Vec<Vec3> = source
+        .positions
+        .iter()
+        .filter(|&&position| !kept.contains(&key(position)))
+        .map(|&position| position.into())
+        .collect();
+    if gone.is_empty() && simplified.triangles.len() == source.triangles.len() {
+        return 0.0;
     }
-    let to_source = TriangleGrid::new(source);
-    for &position in &simplified.positions {
-        worst = worst.max(to_source.distance_beyond(position.into(), worst));
-    }
+    let worst = TriangleGrid::new(simplified).farthest(&gone, 0.0);
+    let mut points: Vec<Vec3> = Vec::with_capacity(simplified.triangles.len() * 2);
     for &triangle in &simplified.triangles {
         let [a, b, c] = triangle.map(|v| Vec3::from(simplified.positions[v as usize]));
-        worst = worst.max(to_source.distance_beyond((a + b + c) / 3.0, worst));
+        points.push((a + b + c) / 3.0);
+        // Its corners are sampled in turn, one for each triangle.
+        points.push(a);
     }
+    let worst = TriangleGrid::new(source).farthest(&points, worst);
     f64::from(worst) * SAMPLING_ALLOWANCE
 }
 
 /// Triangles in a uniform grid over their bounding box.
-struct TriangleGrid<'a> {
-    mesh: &'a Mesh,
+struct TriangleGrid {
     low: Vec3,
     per_cell: f32,
     cells: [i32; 3],
     /// Where each cell's triangles begin in `members`.
     first: Vec<u32>,
-    members: Vec<u32>,
+    members: Vec<[Vec3; 3]>,
 }
 
 /// Cells for each triangle: more makes the search cheaper and the grid dearer.
 const CELLS_PER_TRIANGLE: f32 = 2.0;
 
-impl<'a> TriangleGrid<'a> {
-    fn new(mesh: &'a Mesh) -> Self {
+impl TriangleGrid {
+    fn new(mesh: &Mesh) -> Self {
         let (low, high) = mesh.bounds().unwrap_or_default();
         let (low, high) = (Vec3::from(low), Vec3::from(high));
         let size = (high - low).max(Vec3::splat((high - low).max_element() * 1e-3 + 1e-20));
@@ -57,20 +68,22 @@ impl<'a> TriangleGrid<'a> {
         let side = (size.x * size.y * size.z / wanted).cbrt().max(size.max_element() / 256.0);
         let cells: [i32; 3] = (size / side).to_array().map(|n| (n.ceil() as i32).clamp(1, 256));
         let mut grid =
-            Self { mesh, low, per_cell: 1.0 / side, cells, first: Vec::new(), members: Vec::new() };
+            Self { low, per_cell: 1.0 / side, cells, first: Vec::new(), members: Vec::new() };
+        let corners = |triangle: [u32; 3]| triangle.map(|v| Vec3::from(mesh.positions[v as usize]));
         let count = (cells[0] * cells[1] * cells[2]) as usize;
         let mut first = vec![0u32; count + 1];
         for &triangle in &mesh.triangles {
-            grid.for_cells_of(triangle, |cell| first[cell + 1] += 1);
+            grid.for_cells_of(corners(triangle), |cell| first[cell + 1] += 1);
         }
         for cell in 0..count {
             first[cell + 1] += first[cell];
         }
         let mut fill = first.clone();
-        let mut members = vec![0u32; first[count] as usize];
-        for (number, &triangle) in mesh.triangles.iter().enumerate() {
-            grid.for_cells_of(triangle, |cell| {
-                members[fill[cell] as usize] = number as u32;
+        let mut members = vec![[Vec3::ZERO; 3]; first[count] as usize];
+        for &triangle in &mesh.triangles {
+            let corners = corners(triangle);
+            grid.for_cells_of(corners, |cell| {
+                members[fill[cell] as usize] = corners;
                 fill[cell] += 1;
             });
         }
@@ -79,13 +92,21 @@ impl<'a> TriangleGrid<'a> {
         grid
     }
 
+    /// The farthest of some of the points, or `least` where none is farther.
+    fn farthest(&self, points: &[Vec3], least: f32) -> f32 {
+        let stride = points.len().div_ceil(MOST_SAMPLES).max(1);
+        points
+            .iter()
+            .step_by(stride)
+            .fold(least, |worst, &point| worst.max(self.distance_beyond(point, worst)))
+    }
+
     fn cell_at(&self, point: Vec3) -> [i32; 3] {
         let at = ((point - self.low) * self.per_cell).to_array();
         std::array::from_fn(|i| (at[i] as i32).clamp(0, self.cells[i] - 1))
     }
 
-    fn for_cells_of(&self, triangle: [u32; 3], mut visit: impl FnMut(usize)) {
-        let [a, b, c] = triangle.map(|v| Vec3::from(self.mesh.positions[v as usize]));
+    fn for_cells_of(&self, [a, b, c]: [Vec3; 3], mut visit: impl FnMut(usize)) {
         let (from, to) = (self.cell_at(a.min(b).min(c)), self.cell_at(a.max(b).max(c)));
         for z in from[2]..=to[2] {
             for y in from[1]..=to[1] {
@@ -123,9 +144,7 @@ impl<'a> TriangleGrid<'a> {
             }
             self.for_ring(home, ring, |cell| {
                 let range = self.first[cell] as usize..self.first[cell + 1] as usize;
-                for &number in &self.members[range] {
-                    let triangle = self.mesh.triangles[number as usize];
-                    let [a, b, c] = triangle.map(|v| Vec3::from(self.mesh.positions[v as usize]));
+                for &[a, b, c] in &self.members[range] {
                     best = best.min(squared_distance(point, a, b, c));
                 }
             });

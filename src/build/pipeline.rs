@@ -274,14 +274,13 @@ pub fn nodes_dir(out: &Path) -> PathBuf {
     out.join(NODES_DIR)
 }
 
-/// More threads than this are a mistake: starting them alone would stall the machine.
-pub const MOST_THREADS: usize = 1024;
+/// More threads than any machine has cores would only take its memory.
+const MOST_THREADS: usize = 1024;
 
-/// Runs a build on a pool of its own with this many threads, at most [`MOST_THREADS`]; 0 is one
-/// per core.
+/// Runs a build on a pool of its own with this many threads; 0 is one per core.
 pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T> {
     if threads > MOST_THREADS {
-        return Err(Error::Usage(format!("threads is {threads}, expected 0 to {MOST_THREADS}")));
+        return Err(Error::Usage(format!("{threads} threads, expected 0 to {MOST_THREADS}")));
     }
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)

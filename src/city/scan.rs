@@ -23,6 +23,8 @@ const RIDGE: f64 = 0.15;
 /// The pavement's width and its height above the road, metres.
 const PAVEMENT: f64 = 3.0;
 const KERB: f64 = 0.12;
+/// How far the ground reaches under the façades, below the deepest setback, metres.
+const GROUND_BEHIND: f64 = 0.7;
 /// Never a vertex.
 const ABSENT: u32 = u32::MAX;
 
@@ -230,7 +232,8 @@ impl Scanner<'_> {
         let first = self.scan.positions.len() as u32;
         let length = self.facade.length + 2.0 * overhang;
         for row in 0..=across {
-            let y = f64::from(row) / f64::from(across) * HALF_STREET - HALF_STREET;
+            let y =
+                f64::from(row) / f64::from(across) * (HALF_STREET + GROUND_BEHIND) - HALF_STREET;
             let level = if y < -PAVEMENT { -KERB } else { 0.0 };
             for column in 0..=along {
                 let key = u64::from(column) << 32 | u64::from(row);

@@ -8,6 +8,10 @@
 mod clean;
 mod color;
 mod find;
+mod gltf;
+mod gltf_buffers;
+mod gltf_materials;
+mod gltf_nodes;
 mod lines;
 mod mtl;
 mod obj;
@@ -32,7 +36,7 @@ use crate::{Error, Result};
 pub fn load(path: &Path) -> Result<Model> {
     match find::kind(path) {
         Some(find::Kind::Obj) => obj::load(path),
-        Some(find::Kind::Gltf) => Err(Error::input(path, "glTF cannot be read yet")),
+        Some(find::Kind::Gltf) => gltf::load(path),
         None => {
             Err(Error::input(path, format!("not a model by its extension; {}", find::EXPECTED)))
         }
@@ -80,3 +84,6 @@ fn assemble(mut model: Model) -> Result<Model> {
     }
     Ok(model)
 }
+
+#[cfg(test)]
+mod tests;

@@ -30,10 +30,17 @@ const BUFFER_BYTES: usize = 1 << 20;
 /// Most vertices of a file, so that every index fits 32 bits with room for markers.
 const MOST_VERTICES: usize = u32::MAX as usize - 64;
 
+/// Most corners of a face: beyond this the ear clipping's own indices could overflow.
+const MOST_CORNERS: usize = 1 << 20;
+
 /// Reads the OBJ at `path` with its material libraries.
 pub(super) fn load(path: &Path) -> Result<Model> {
+    read(path, BufReader::with_capacity(BUFFER_BYTES, super::open(path)?))
+}
+
+/// Reads an OBJ from `reader`; what it names is looked for beside `path`.
+fn read(path: &Path, mut reader: impl BufRead) -> Result<Model> {
     let unreadable = |error| Error::input(path, format!("cannot be read: {error}"));
-    let mut reader = BufReader::with_capacity(BUFFER_BYTES, super::open(path)?);
     let head = reader.fill_buf().map_err(unreadable)?;
     if head.is_empty() {
         return Err(Error::input(path, "is empty; expected a Wavefront OBJ with faces"));
@@ -53,7 +60,7 @@ pub(super) fn load(path: &Path) -> Result<Model> {
     obj.finish(lines.count())
 }
 
-/// What of a part is not in the result.
+/// A part in the making.
 #[derive(Default)]
 struct PartState {
     part: Part,
@@ -243,6 +250,10 @@ impl<'a> Obj<'a> {
         if self.face.len() < 3 {
             self.tally.not_triangles += 1;
             return Ok(());
+        }
+        if self.face.len() > MOST_CORNERS {
+            let count = self.face.len();
+            return Err(format!("face of {count} corners; expected at most {MOST_CORNERS}"));
         }
         if self.unifier.len() + self.face.len() >= MOST_VERTICES {
             return Err(format!("more than {MOST_VERTICES} distinct vertices; divide the file"));
@@ -494,3 +505,6 @@ fn resolve(index: i64, count: usize, what: &str) -> Result<u32, String> {
     }
     Ok(from_zero as u32)
 }
+
+#[cfg(test)]
+mod tests;

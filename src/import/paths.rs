@@ -25,7 +25,7 @@ impl Finder {
     /// as slashes; the end of the path below the model's folder, longest first; and the base name
     /// in that folder or one for pictures beside the model, in whatever case of letters.
     pub(super) fn find(&mut self, name: &str) -> Option<PathBuf> {
-        let name = name.trim();
+        let name = name.trim().trim_matches('"');
         if name.is_empty() || name.contains('\0') {
             return None;
         }

@@ -1,10 +1,12 @@
 //! Words, numbers and face corners of an OBJ line, from bytes.
 
-/// Splits off the first word of `rest`; `None` where only white space is left.
+/// Splits off the first word of `rest`; `None` where only white space is left. Control characters
+/// count as white space, so that one comparison a byte is enough.
+#[inline]
 pub(super) fn word<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
-    let start = rest.iter().position(|byte| !byte.is_ascii_whitespace())?;
+    let start = rest.iter().position(|byte| *byte > b' ')?;
     let tail = &rest[start..];
-    let end = tail.iter().position(u8::is_ascii_whitespace).unwrap_or(tail.len());
+    let end = tail.iter().position(|byte| *byte <= b' ').unwrap_or(tail.len());
     *rest = &tail[end..];
     Some(&tail[..end])
 }

@@ -16,7 +16,7 @@ const SIDE_MULTIPLE: usize = 4;
 const CROP_FILL: f64 = 0.9;
 
 /// An island that fills its bounding box to this part is packed as it is, else divided.
-const ISLAND_FILL: f64 = 0.8;
+const ISLAND_FILL: f64 = 0.95;
 
 /// What one atlas is made of.
 pub(crate) struct Sheet<'a> {
@@ -61,10 +61,11 @@ pub(crate) struct Atlas {
     pub patches: Vec<Vec<u32>>,
 }
 
-/// A window of a level picture, in texels.
+/// A window of a level picture, in texels; it may reach beyond the picture, whose border texels
+/// then go on.
 #[derive(Clone, Copy)]
 struct Window {
-    origin: [usize; 2],
+    origin: [isize; 2],
     size: [usize; 2],
 }
 
@@ -72,7 +73,7 @@ struct Window {
 struct Patch {
     picture: usize,
     /// Texel of the shape's corner; multiples of the cell.
-    origin: [usize; 2],
+    origin: [isize; 2],
     shape: Shape,
 }
 
@@ -117,7 +118,7 @@ impl Sheet<'_> {
                 return None;
             }
             // The texels that round the size up are the source's own where it has them.
-            window.origin[axis] = start.min(side.saturating_sub(size));
+            window.origin[axis] = start.min(side.saturating_sub(size)) as isize;
             window.size[axis] = size;
         }
         Some(window)
@@ -163,7 +164,8 @@ impl Sheet<'_> {
                     }
                 }
                 if whole {
-                    let origin = [0, 1].map(|axis| origin[axis] + start[axis] * self.cell);
+                    let origin =
+                        [0, 1].map(|axis| origin[axis] + (start[axis] * self.cell) as isize);
                     patches.push(Patch { picture: index, origin, shape });
                 }
             }
@@ -173,7 +175,7 @@ impl Sheet<'_> {
     }
 
     /// The cells that triangles of a picture use, and the texel where their grid begins.
-    fn cells(&self, picture: &SheetPicture, triangles: &[u32]) -> ([usize; 2], BitGrid) {
+    fn cells(&self, picture: &SheetPicture, triangles: &[u32]) -> ([isize; 2], BitGrid) {
         let scale = 1.0 / self.cell as f64;
         let mut bounds = UvBox::EMPTY;
         for triangle in triangles {
@@ -182,11 +184,11 @@ impl Sheet<'_> {
         let mut first = [0; 2];
         let mut size = [0; 2];
         for axis in 0..2 {
-            // Cells that begin beyond the picture have no texels of their own.
-            let count = picture.picture.size[axis].div_ceil(self.cell);
-            let (low, high) = (bounds.min[axis] * scale, bounds.max[axis] * scale);
+            // Sampling at the picture's border reads one cell beyond it, so cell −1 is the first.
+            let count = picture.picture.size[axis].div_ceil(self.cell) + 2;
+            let (low, high) = (bounds.min[axis] * scale + 1.0, bounds.max[axis] * scale + 1.0);
             let (start, end) = raster::touched(low, high, count);
-            first[axis] = start.min(count - 1);
+            first[axis] = start as isize - 1;
             size[axis] = end.saturating_sub(start).max(1);
         }
         let mut grid = BitGrid::new(size[0], size[1]);
@@ -197,14 +199,14 @@ impl Sheet<'_> {
                 .map(|at| [at[0] * scale - start[0], at[1] * scale - start[1]]);
             rasterizer.mark(corners, &mut grid);
         }
-        (first.map(|cell| cell * self.cell), grid)
+        (first.map(|cell| cell * self.cell as isize), grid)
     }
 
     /// The triangles of each island. A chart lies in one island, so its first triangle tells.
     fn members(
         &self,
         picture: &SheetPicture,
-        origin: [usize; 2],
+        origin: [isize; 2],
         islands: &Islands,
     ) -> Vec<Vec<u32>> {
         let mut members = vec![Vec::new(); islands.shapes.len()];
@@ -213,10 +215,8 @@ impl Sheet<'_> {
         for (triangle, chart) in picture.charts.iter().enumerate() {
             let island = *island_of[*chart as usize].get_or_insert_with(|| {
                 let corner = picture.corners[triangle][0];
-                let cell = [0, 1].map(|axis| {
-                    let texel = corner[axis].min(picture.picture.size[axis] as f64 - 0.5);
-                    ((texel - origin[axis] as f64).max(0.0) as usize) / self.cell
-                });
+                let cell = [0, 1]
+                    .map(|axis| (corner[axis] - origin[axis] as f64).max(0.0) as usize / self.cell);
                 islands.at(cell[0], cell[1]).unwrap_or(0)
             });
             if let Some(members) = members.get_mut(island) {
@@ -244,7 +244,10 @@ impl Sheet<'_> {
             for [row, from, to] in &patch.shape.runs {
                 let (row, from, to) = (*row as usize, *from as usize, *to as usize);
                 let window = Window {
-                    origin: [patch.origin[0] + from * self.cell, patch.origin[1] + row * self.cell],
+                    origin: [
+                        patch.origin[0] + (from * self.cell) as isize,
+                        patch.origin[1] + (row * self.cell) as isize,
+                    ],
                     size: [(to - from) * self.cell, self.cell],
                 };
                 let target = [placement.x + from, placement.y + row];
@@ -275,22 +278,27 @@ impl Page {
         self.pixels.len() / (self.size[0] * self.size[1]).max(1)
     }
 
-    /// Copies a window of a picture to `target`; beyond the picture its last texels go on.
+    /// Copies a window of a picture to `target`; beyond the picture its border texels go on.
     fn copy(&mut self, picture: &LevelPicture, window: Window, target: [usize; 2]) {
         let channels = picture.channels;
+        let [columns, rows] = picture.size;
         let width = window.size[0].min(self.size[0] - target[0]);
-        let start = window.origin[0].min(picture.size[0] - 1);
-        let inside = width.min(picture.size[0] - start);
+        let before = (window.origin[0].min(0).unsigned_abs()).min(width - 1);
+        let start = (window.origin[0].max(0) as usize).min(columns - 1);
+        let inside = (width - before).min(columns - start);
         for y in 0..window.size[1].min(self.size[1] - target[1]) {
-            let row = (window.origin[1] + y).min(picture.size[1] - 1);
+            let row = (window.origin[1] + y as isize).clamp(0, rows as isize - 1) as usize;
             let source = picture.row(row, start, inside);
             let at = ((target[1] + y) * self.size[0] + target[0]) * channels;
-            let (copied, beyond) =
-                self.pixels[at..at + width * channels].split_at_mut(inside * channels);
-            copied.copy_from_slice(source);
-            let last = &source[(inside - 1) * channels..];
-            for texel in beyond.chunks_exact_mut(channels) {
-                texel.copy_from_slice(last);
+            let copied = &mut self.pixels[at..at + width * channels];
+            let (left, copied) = copied.split_at_mut(before * channels);
+            let (middle, right) = copied.split_at_mut(inside * channels);
+            middle.copy_from_slice(source);
+            for texel in left.chunks_exact_mut(channels) {
+                texel.copy_from_slice(&source[..channels]);
+            }
+            for texel in right.chunks_exact_mut(channels) {
+                texel.copy_from_slice(&source[(inside - 1) * channels..]);
             }
         }
     }

@@ -30,6 +30,23 @@ impl Default for TextureOptions {
     }
 }
 
+/// The least factor of the coarsest level above the source. With levels four apart all texels sum
+/// up to `1 + 4/3 / factor` times the source's: 1.52 times here, but 2.3 times for a level that
+/// simplifies hardly at all.
+const LEAST_REDUCTION: f64 = 2.56;
+
+/// Texture factors for levels with these simplification factors (the root's first, 1 last).
+///
+/// The texel count follows the simplification factor, except where the level above the source
+/// has hardly fewer triangles than it: then all levels above the source are reduced further, by
+/// the same ratio, so that the sum of all texels stays bounded.
+pub fn texture_factors(simplifications: &[f64]) -> Vec<f64> {
+    let reduced = simplifications.iter().copied().filter(|factor| *factor > 1.0);
+    let least = reduced.fold(f64::INFINITY, f64::min);
+    let ratio = (LEAST_REDUCTION / least).max(1.0);
+    simplifications.iter().map(|factor| if *factor > 1.0 { factor * ratio } else { 1.0 }).collect()
+}
+
 /// The textures of one block at all its levels.
 #[derive(Debug)]
 pub struct BlockTextures<'a> {
@@ -82,17 +99,17 @@ impl AtlasSource {
 impl<'a> BlockTextures<'a> {
     /// Decodes (or finds decoded) what the block's mesh uses and scales it for every level.
     ///
-    /// `mesh` is the whole block at full detail; `simplifications` has each level's factor, the
-    /// root's first and 1 (the source) last.
+    /// `mesh` is the whole block at full detail; `factors` says for each level how many source
+    /// texels become one (see [`texture_factors`]), the root's first and 1 (the source) last.
     pub fn prepare(
         cache: &TextureCache<'a>,
         shared: &'a SharedTextures,
         mesh: &Mesh,
-        simplifications: &[f64],
+        factors: &[f64],
         options: TextureOptions,
     ) -> Self {
         let (model, plan) = (cache.model(), cache.plan());
-        let steps: Vec<f64> = simplifications
+        let steps: Vec<f64> = factors
             .iter()
             .map(|factor| if factor.is_finite() { factor.max(1.0).sqrt() } else { 1.0 })
             .collect();
@@ -266,5 +283,22 @@ impl Usage {
             }
         }
         covered
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texture_factors_bound_the_sum_of_all_texels() {
+        assert_eq!(texture_factors(&[48.0, 12.0, 3.0, 1.0]), [48.0, 12.0, 3.0, 1.0]);
+        assert_eq!(texture_factors(&[1.0]), [1.0]);
+        for least in [1.0001, 1.39, 2.0, 3.9] {
+            let factors: Vec<f64> =
+                (0..6).rev().map(|level| least * 4f64.powi(level)).chain([1.0]).collect();
+            let sum: f64 = texture_factors(&factors).iter().map(|factor| 1.0 / factor).sum();
+            assert!(sum < 1.53, "{least}: {sum}");
+        }
     }
 }

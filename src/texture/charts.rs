@@ -28,10 +28,7 @@ impl UvBox {
     pub const EMPTY: Self = Self { min: [f64::INFINITY; 2], max: [f64::NEG_INFINITY; 2] };
 
     pub fn add(&mut self, uv: [f64; 2]) {
-        for axis in 0..2 {
-            self.min[axis] = self.min[axis].min(uv[axis]);
-            self.max[axis] = self.max[axis].max(uv[axis]);
-        }
+        self.unite(&Self { min: uv, max: uv });
     }
 
     pub fn unite(&mut self, other: &UvBox) {

@@ -87,11 +87,12 @@ pub(crate) fn fill_all(pixels: &mut [u8], channels: usize, known: &BitGrid) {
                     }
                 }
             }
-            if count > 0 {
+            if count != 0 {
                 coarse_known.set(x, y);
                 let texel = &mut coarse[(y * half[0] + x) * channels..][..channels];
-                for (value, sum) in texel.iter_mut().zip(sums) {
-                    *value = ((sum + count / 2) / count) as u8;
+                let mean = sums.map(|sum| (sum + count / 2) / count);
+                for (value, mean) in texel.iter_mut().zip(mean) {
+                    *value = mean as u8;
                 }
             }
         }

@@ -34,7 +34,7 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-pub use block::{BlockTextures, TextureOptions};
+pub use block::{BlockTextures, TextureOptions, texture_factors};
 pub use cache::TextureCache;
 pub use node::TexturedNode;
 pub use picture::{Picture, decode_texture};

@@ -44,10 +44,11 @@ struct Mapping {
 impl Mapping {
     fn texel(&self, uv: [f32; 2]) -> [f64; 2] {
         let uv = charts::sane(uv);
-        [0, 1].map(|axis| {
+        let along = |axis: usize| {
             let texel = uv[axis] * self.scale[axis] - self.offset[axis];
             if self.limit[axis].is_finite() { texel.clamp(0.0, self.limit[axis]) } else { texel }
-        })
+        };
+        [along(0), along(1)]
     }
 }
 

@@ -82,7 +82,7 @@ impl Packing {
 const MAX_COLUMNS: usize = 384;
 
 /// Widths that are tried, relative to the side of a square of the shapes' area.
-const WIDTHS: [f64; 6] = [0.92, 1.0, 1.04, 1.08, 1.16, 1.3];
+const WIDTHS: [f64; 9] = [1.0, 0.94, 1.06, 1.12, 0.85, 1.2, 0.75, 1.35, 1.6];
 
 /// Packs shapes into pages of at most `max` cells a side; one page where they fit, as near to a
 /// square as wastes least. `None` where a shape is larger than a page.
@@ -311,16 +311,18 @@ fn or_shifted(row: &mut [u64], by: usize) {
     }
 }
 
+/// Sets `start..end`, which is not empty.
 fn set(row: &mut [u64], start: usize, end: usize) {
-    for word in start / 64..end.div_ceil(64) {
-        let mut bits = !0u64;
-        if word == start / 64 {
-            bits &= !0 << (start % 64);
+    let (first, last) = (start / 64, (end - 1) / 64);
+    for (word, bits) in row.iter_mut().enumerate().take(last + 1).skip(first) {
+        let mut mask = !0u64;
+        if word == first {
+            mask &= !0 << (start % 64);
         }
-        if word == (end - 1) / 64 {
-            bits &= !0 >> (63 - (end - 1) % 64);
+        if word == last {
+            mask &= !0 >> (63 - (end - 1) % 64);
         }
-        row[word] |= bits;
+        *bits |= mask;
     }
 }
 

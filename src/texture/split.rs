@@ -9,7 +9,7 @@
 use super::charts::UvBox;
 
 /// A cut must reduce the sum of box areas to this part, to be worth its gutters and vertices.
-const WORTHWHILE: f64 = 0.86;
+const WORTHWHILE: f64 = 0.95;
 
 /// Candidates for a cut along each axis are the borders of this many bins.
 const BINS: usize = 16;

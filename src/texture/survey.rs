@@ -120,8 +120,9 @@ fn survey() {
     if let Some(last) = factors.last_mut() {
         *last = 1.0;
     }
+    let factors = texture_factors(&factors);
     let shared = SharedTextures::new();
-    let cache = TextureCache::new(&model, &plan, [0..model.materials.len() as u32]);
+    let cache = TextureCache::new(&model, &plan, std::iter::once(0..model.materials.len() as u32));
     let start = Instant::now();
     for texture in &model.textures {
         decode_texture(texture).expect("decodes");
@@ -157,8 +158,9 @@ fn survey() {
             for (index, node) in nodes.iter().enumerate().step_by(nodes.len().div_ceil(6)) {
                 for (page, image) in node.mesh.images.iter().enumerate() {
                     if let NodeImageData::Embedded { bytes, .. } = &image.data {
-                        let name = format!("l{level}_n{index}_p{page}.jpg");
-                        std::fs::write(Path::new(out).join(name), bytes).expect("writes");
+                        let name = format!("l{level}_n{index}_p{page}.png");
+                        let picture = image::load_from_memory(bytes).expect("decodes");
+                        picture.save(Path::new(out).join(name)).expect("writes");
                     }
                 }
             }

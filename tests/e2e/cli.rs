@@ -109,7 +109,7 @@ fn bad_usage_is_refused_with_the_range() {
         (&["--borders", "none", "good.obj", "out"], &["locked, shared, skirts"]),
         (&["--simplify-from", "x", "good.obj", "out"], &["original, children"]),
         (&["--up", "x", "good.obj", "out"], &["y, z"]),
-        (&["--threads", "100000", "good.obj", "out"], &["threads is 100000", "0 to 1024"]),
+        (&["--threads", "100000", "good.obj", "out"], &["100000 threads", "0 to 1024"]),
         (&["inspect"], &["OUT"]),
     ];
     for (arguments, parts) in cases {

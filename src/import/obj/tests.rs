@@ -1,0 +1,401 @@
+use std::fs;
+
+use super::super::tests::check;
+use super::*;
+use crate::mesh::{AlphaMode, Wrap};
+
+/// Reads `obj` as `city.obj` from a folder that also holds `files`.
+fn read(obj: impl AsRef<[u8]>, files: &[(&str, &str)]) -> Result<Model> {
+    read_from(&folder_with(files), obj)
+}
+
+fn folder_with(files: &[(&str, &str)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, content) in files {
+        fs::write(folder.path().join(name), content).unwrap();
+    }
+    folder
+}
+
+fn read_from(folder: &tempfile::TempDir, obj: impl AsRef<[u8]>) -> Result<Model> {
+    let model = super::read(&folder.path().join("city.obj"), obj.as_ref())?;
+    check(&model);
+    Ok(model)
+}
+
+/// What is wrong with `obj`, without the file's name.
+fn refusal(obj: impl AsRef<[u8]>) -> String {
+    match read(obj, &[]) {
+        Err(Error::Input { what, .. }) => what,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn warnings(model: &Model) -> Vec<(String, u64)> {
+    let short = |text: &str| text.split_once("city.obj: ").unwrap().1.to_owned();
+    model.warnings.iter().map(|(text, times)| (short(text), times)).collect()
+}
+
+fn group_names(model: &Model) -> Vec<&str> {
+    model.groups.iter().map(|group| group.name.as_str()).collect()
+}
+
+const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+#[test]
+fn a_square_without_groups_is_one_group_of_the_files_name() {
+    let model = read(format!("{SQUARE}f 1 2 3 4\n"), &[]).unwrap();
+    assert_eq!(group_names(&model), ["city"]);
+    assert_eq!(model.parts[0].positions.len(), 4);
+    assert_eq!(model.parts[0].indices, [0, 1, 2, 0, 2, 3]);
+    assert_eq!(model.materials, [crate::mesh::Material::plain("default")]);
+    assert_eq!((model.up, model.warnings.is_empty()), (None, true));
+}
+
+#[test]
+fn doubles_are_kept() {
+    let obj = "v 678016.123456789 5403456.987654321 0.1\nv 1 0 0\nv 0 1 0\nf 1 2 3";
+    let model = read(obj, &[]).unwrap();
+    assert_eq!(model.parts[0].positions[0], [678_016.123_456_789, 5_403_456.987_654_321, 0.1]);
+}
+
+#[test]
+fn parts_are_by_group_and_material_in_order_of_appearance() {
+    let obj = format!(
+        "mtllib a.mtl\n{SQUARE}o one\nusemtl red\nf 1 2 3\nusemtl blue\nf 1 3 4\nusemtl red\n\
+         f 2 3 4\no one\nf 1 2 4\no two\no three\nf 1 2 3\no one\nf 1 2 3\n"
+    );
+    let model = read(obj, &[("a.mtl", "newmtl blue\nKd 0 0 1\nnewmtl red\nKd 1 0 0\n")]).unwrap();
+    assert_eq!(group_names(&model), ["one", "three", "one"]);
+    let parts: Vec<_> = model
+        .parts
+        .iter()
+        .map(|part| {
+            let material = &model.materials[part.material as usize].name;
+            (part.group, material.as_str(), part.indices.len() / 3)
+        })
+        .collect();
+    assert_eq!(parts, [(0, "red", 3), (0, "blue", 1), (1, "red", 1), (2, "red", 1)]);
+    assert_eq!(model.parts[0].positions.len(), 4, "vertices are shared inside a part");
+    assert_eq!(model.dependencies.len(), 2);
+    assert!(warnings(&model).is_empty());
+}
+
+#[test]
+fn negative_indices_count_back() {
+    let model = read("v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 5 5 5\n", &[]).unwrap();
+    assert_eq!(model.parts[0].positions, [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]]);
+    assert_eq!(warnings(&model), [("vertex that no face uses, ignored".to_owned(), 2)]);
+}
+
+#[test]
+fn texture_coordinates_are_transformed_then_flipped() {
+    let obj = format!(
+        "mtllib my lib.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 nan\nusemtl m\n\
+         f 1/1 2/2 3/3\nf 1/1 3/3 4\nf 1/4 2/2 4/3"
+    );
+    let mtl = "newmtl m\nmap_Kd -clamp on -s 2 4 1 -o 0.5 0.25 my brick.png\nmap_d my brick.png\n";
+    let model = read(obj, &[("my lib.mtl", mtl), ("my brick.png", "")]).unwrap();
+    let part = &model.parts[0];
+    let texcoords: Vec<_> = part.indices.iter().map(|at| part.texcoords[*at as usize]).collect();
+    assert_eq!(texcoords[..3], [[0.5, 0.75], [2.5, 0.75], [2.5, -3.25]]);
+    assert_eq!(texcoords[5], [0.0, 0.0], "a corner without a texture coordinate");
+    assert_eq!(texcoords[6], [0.5, -3.25], "u and v are 0 and 1 where one is not finite");
+    assert_eq!(model.materials[0].wrap, [Wrap::Clamp; 2]);
+    assert_eq!(model.materials[0].alpha, AlphaMode::Mask { cutoff: 0.5 });
+    assert_eq!(model.textures.len(), 1);
+    assert_eq!(model.dependencies.len(), 3);
+    let expected = [
+        ("textured face without texture coordinates, set to 0".to_owned(), 1),
+        ("texture coordinate that is not finite, set to 0".to_owned(), 1),
+    ];
+    assert_eq!(warnings(&model), expected);
+}
+
+#[test]
+fn a_position_with_two_texture_coordinates_is_two_vertices_only_where_textured() {
+    let obj = |material: &str| {
+        format!(
+            "mtllib a.mtl\n{SQUARE}vt 0 0\nvt 1 1\nusemtl {material}\nf 1/1 2/1 3/1\nf 1/2 3/1 4/1"
+        )
+    };
+    let files = [("a.mtl", "newmtl t\nmap_Kd t.png\nnewmtl c\nKd 1 1 1"), ("t.png", "")];
+    assert_eq!(read(obj("t"), &files).unwrap().parts[0].positions.len(), 5);
+    let plain = read(obj("c"), &files).unwrap();
+    assert_eq!(plain.parts[0].positions.len(), 4);
+    assert!(plain.textures.is_empty(), "a material that no face uses names no picture");
+}
+
+#[test]
+fn a_library_may_come_after_its_use() {
+    let obj = format!(
+        "{SQUARE}vt 0 0\nvt 1 0.25\nusemtl t\nf 1/1 2/2 3/2\nusemtl c\nf 1/1 3/2 4/1\nmtllib a.mtl"
+    );
+    let files = [("a.mtl", "newmtl t\nmap_Kd -o 0.5 0.5 t.png\nnewmtl c\nKd 1 1 1"), ("t.png", "")];
+    let model = read(obj, &files).unwrap();
+    assert_eq!(model.parts[0].texcoords, [[0.5, 0.5], [1.5, 0.25], [1.5, 0.25]]);
+    assert!(model.parts[1].texcoords.is_empty());
+    assert!(warnings(&model).is_empty());
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let obj = format!("mtllib gone.mtl\n{SQUARE}usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n");
+    let model = read(&obj, &[]).unwrap();
+    let expected = [
+        ("material library gone.mtl not found".to_owned(), 1),
+        ("usemtl without a material library, taken as plain grey".to_owned(), 2),
+    ];
+    assert_eq!(warnings(&model), expected);
+    let mtl = "newmtl a\nKd 0 1 0\nmap_Kd lost.jpg\n";
+    let model = read(obj.replace("gone", "here"), &[("here.mtl", mtl)]).unwrap();
+    let expected = [
+        ("material a: texture lost.jpg not found".to_owned(), 1),
+        ("material b is in no library, taken as plain grey".to_owned(), 1),
+    ];
+    assert_eq!(warnings(&model), expected);
+    assert_eq!(model.materials[0].base_color, [0.0, 1.0, 0.0, 1.0]);
+    assert_eq!(model.materials[1], crate::mesh::Material::plain("b"));
+}
+
+#[test]
+fn vertex_colours_are_linear_and_white_ones_are_dropped() {
+    let model = read("v 0 0 0\nv 1 0 0 0.5 0 2\nv 0 1 0 1 1 1\nf 1 2 3\n", &[]).unwrap();
+    let colors = &model.parts[0].colors;
+    assert_eq!(colors[0], [65535; 4]);
+    assert_eq!(colors[1], [to_unorm16(srgb_to_linear(0.5)), 0, 65535, 65535]);
+    assert_eq!(warnings(&model), [("vertex colour outside 0 to 1, clamped".to_owned(), 1)]);
+    let white = "v 0 0 0 1 1 1\nv 1 0 0 1.0 1.0 1.0\nv 0 1 0 1 1 1\nf 1 2 3\n";
+    assert!(read(white, &[]).unwrap().parts[0].colors.is_empty());
+    // Colours that begin after a part has vertices.
+    let late = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nv 1 1 0 0 0 0\nf 2 4 3\n";
+    let model = read(late, &[]).unwrap();
+    assert_eq!(model.parts[0].colors[..3], [[65535; 4]; 3]);
+    assert_eq!(model.parts[0].colors[3], [0, 0, 0, 65535]);
+}
+
+#[test]
+fn what_is_no_triangle_is_counted() {
+    let obj = format!(
+        "{SQUARE}v nan 0 0\nv 1e999 0 0\nf 1 2 3\nf 1 2 5\nf 1 2 3 6\nf 1 1 2\nf 2 3 1\nl 1 2 3\n\
+         p 1\nf 1 2\nf 1 2 1 2\n"
+    );
+    let model = read(obj, &[]).unwrap();
+    assert_eq!(model.triangle_count(), 1);
+    let expected = [
+        ("triangle with a coordinate that is not finite, dropped", 3),
+        ("degenerate triangle, dropped", 1),
+        ("duplicate triangle, dropped", 1),
+        ("polygon without area, dropped", 1),
+        ("point, line or free-form element, ignored", 3),
+        ("vertex that no face uses, ignored", 2),
+    ];
+    assert_eq!(warnings(&model), expected.map(|(text, times)| (text.to_owned(), times)));
+}
+
+#[test]
+fn where_nothing_is_left_the_file_is_refused() {
+    assert!(refusal("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n").contains("not finite, dropped (1)"));
+    assert_eq!(refusal(""), "is empty; expected a Wavefront OBJ with faces");
+    assert!(refusal(SQUARE).contains("no face; expected at least one (there are 4 vertices"));
+    assert!(
+        refusal("Dear reader,\nthis is a letter.\n").contains("no vertex and no face in 2 lines")
+    );
+    assert!(refusal(b"glTF\x02\0\0\0").contains("is not a text file"));
+}
+
+#[test]
+fn errors_name_the_line() {
+    let line_7 = |line: &str| refusal(format!("# square\n\n{SQUARE}{line}\nf 1 2 3\n"));
+    for (line, expected) in [
+        ("f 1 2 9", "line 7: vertex index 9 of 4; expected 1 to 4, or -4 to -1"),
+        ("f 1 2 -5", "line 7: vertex index -5 of 4; expected 1 to 4, or -4 to -1"),
+        ("f 1/1 2/1 3/1", "line 7: texture coordinate index 1 of 0; expected 1 to 0, or -0 to -1"),
+        ("f 1 2 0", "line 7: face corner \"0\"; expected v, v/vt, v//vn or v/vt/vn"),
+        ("f 1 2 x", "line 7: face corner \"x\"; expected v, v/vt, v//vn or v/vt/vn"),
+        ("v 1 2", "line 7: vertex of 2 coordinates; expected 3"),
+        ("v 1 2 z", "line 7: vertex coordinate \"z\"; expected a number"),
+        ("vt u", "line 7: texture coordinate \"u\"; expected a number"),
+        ("vt", "line 7: texture coordinate without a value; expected u and v"),
+        ("f 1 \\\n 2 9", "line 7: vertex index 9 of 4; expected 1 to 4, or -4 to -1"),
+    ] {
+        assert_eq!(line_7(line), expected);
+    }
+}
+
+#[test]
+fn habits_of_exporters_are_understood() {
+    let obj = b"\xef\xbb\xbf# fa\xe7ade\r\nv 0 0 0 # corner\r\nv\t1 0 0\r\nv 1 1 0 1.0\r\n\
+        g fa\xe7ade east\r\ns off\r\nvn 0 0 1\r\nf 1//1 2//1 \\\r\n3//1 # face\r\n";
+    let model = read(obj, &[]).unwrap();
+    assert_eq!(group_names(&model), ["façade east"]);
+    assert_eq!(model.triangle_count(), 1);
+}
+
+#[test]
+fn several_libraries_in_one_statement() {
+    let obj = format!("mtllib a.mtl gone.mtl b.mtl\n{SQUARE}usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4");
+    let files = [("a.mtl", "newmtl a\nKd 1 0 0"), ("b.mtl", "newmtl b\nKd 0 1 0")];
+    let model = read(obj, &files).unwrap();
+    assert_eq!(warnings(&model), [("material library gone.mtl not found".to_owned(), 1)]);
+    assert_eq!(model.materials[1].base_color, [0.0, 1.0, 0.0, 1.0]);
+}
+
+/// Numbers from a seed.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % limit
+    }
+}
+
+/// The corners of all triangles by group and material name, as places and texture coordinates.
+type Soup = BTreeMap<(String, String), Vec<([f64; 3], [f32; 2])>>;
+
+#[test]
+fn random_files_are_read_as_tobj_reads_them() {
+    for seed in 0..200 {
+        let mut random = Random(seed);
+        let mut obj = String::from("mtllib a.mtl\n");
+        let (vertices, texcoords) = (3 + random.below(30), 1 + random.below(20));
+        for vertex in 0..vertices {
+            // Distinct places, so that nothing is degenerate.
+            obj += &format!("v {}.25 {} {vertex}\n", random.below(100), random.below(1000));
+        }
+        for _ in 0..texcoords {
+            obj += &format!("vt 0.{} -{}.5\n", random.below(1000), random.below(9));
+        }
+        let mut seen = std::collections::BTreeSet::new();
+        for group in 0..1 + random.below(4) {
+            obj += &format!("o group {group}\nusemtl {}\n", ["a", "b"][random.below(2)]);
+            for _ in 0..1 + random.below(20) {
+                let corners = [(); 3].map(|()| random.below(vertices));
+                let mut sorted = corners;
+                sorted.sort();
+                if sorted[0] == sorted[1] || sorted[1] == sorted[2] || !seen.insert(sorted) {
+                    continue;
+                }
+                obj += "f";
+                for corner in corners {
+                    let position = if random.below(2) == 0 {
+                        corner as i64 + 1
+                    } else {
+                        corner as i64 - vertices as i64
+                    };
+                    obj += &format!(" {position}/{}", 1 + random.below(texcoords));
+                }
+                obj += "\n";
+                if random.below(5) == 0 {
+                    obj += &format!("usemtl {}\n", ["a", "b"][random.below(2)]);
+                }
+            }
+        }
+        if seen.is_empty() {
+            continue;
+        }
+        let mtl = "newmtl a\nmap_Kd t.png\nnewmtl b\nmap_Kd t.png\n";
+        let model = read(&obj, &[("a.mtl", mtl), ("t.png", "")]).unwrap();
+        let mut ours = Soup::new();
+        for part in &model.parts {
+            let key = (
+                model.groups[part.group as usize].name.clone(),
+                model.materials[part.material as usize].name.clone(),
+            );
+            let corner = |at: &u32| (part.positions[*at as usize], part.texcoords[*at as usize]);
+            ours.entry(key).or_default().extend(part.indices.iter().map(corner));
+        }
+        let options = tobj::LoadOptions::default();
+        let (models, materials) = tobj::load_obj_buf(&mut obj.as_bytes(), &options, |_| {
+            tobj::load_mtl_buf(&mut mtl.as_bytes())
+        })
+        .unwrap();
+        let materials = materials.unwrap();
+        let mut theirs = Soup::new();
+        for tobj::Model { name, mesh } in
+            models.iter().filter(|model| !model.mesh.indices.is_empty())
+        {
+            let material = materials[mesh.material_id.unwrap()].name.clone();
+            let corners = mesh.indices.iter().zip(&mesh.texcoord_indices).map(|(at, uv)| {
+                let [at, uv] = [*at as usize * 3, *uv as usize * 2];
+                let place = [mesh.positions[at], mesh.positions[at + 1], mesh.positions[at + 2]];
+                (place, [mesh.texcoords[uv] as f32, (1.0 - mesh.texcoords[uv + 1]) as f32])
+            });
+            theirs.entry((name.clone(), material)).or_default().extend(corners);
+        }
+        assert_eq!(ours, theirs, "seed {seed}:\n{obj}");
+    }
+}
+
+/// A small file that has every kind of statement.
+const SAMPLE: &str = "mtllib a.mtl\no one\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 1 1 0\nv 0 1 0\n\
+    v 0.5 0.5 1e1\nvt 0 0\nvt 1 1\nvn 0 0 1\nusemtl a\nf 1/1/1 2/2/1 3/1/1 4/2/1\n\
+    g two three\nusemtl b\nf -1//1 -2//1 -3//1\nf 1 2 3 \\\n5 4\nl 1 2 3\n";
+
+#[test]
+fn every_truncation_gives_a_model_or_an_error() {
+    let folder = folder_with(&[("a.mtl", "newmtl a\nmap_Kd a.mtl\n")]);
+    for length in 0..SAMPLE.len() {
+        let _ = read_from(&folder, &SAMPLE[..length]);
+    }
+}
+
+#[test]
+fn mutated_files_give_a_model_or_an_error() {
+    let bytes = SAMPLE.as_bytes();
+    let folder = folder_with(&[("a.mtl", "newmtl a\nmap_Kd a.mtl\nnewmtl b\n")]);
+    for bit in 0..bytes.len() * 8 {
+        let mut flipped = bytes.to_vec();
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        let _ = read_from(&folder, &flipped);
+    }
+    let pieces: [&[u8]; 14] = [
+        b"-",
+        b"/",
+        b" ",
+        b"\n",
+        b"9999999999999999999",
+        b"nan",
+        b"1e400",
+        b"f ",
+        b"usemtl ",
+        b"\\\n",
+        b"0",
+        b".",
+        b"\xff",
+        b"o\n",
+    ];
+    let mut random = Random(1);
+    for _ in 0..3000 {
+        let mut mutated = bytes.to_vec();
+        for _ in 0..1 + random.below(4) {
+            let at = random.below(mutated.len());
+            let end = (at + random.below(4)).min(mutated.len());
+            mutated.splice(at..end, pieces[random.below(pieces.len())].iter().copied());
+        }
+        let _ = read_from(&folder, &mutated);
+    }
+}
+
+#[test]
+fn mutated_libraries_give_a_model() {
+    let mtl = "newmtl a\nKd 0.5 0.5 0.5\nd 0.5\nTr 0.2\nmap_Kd -s 2 2 1 -o 0 1 -clamp on a.mtl\n\
+        map_d a.mtl\nnewmtl b\nKd 1 1\nillum 2\n";
+    let folder = folder_with(&[]);
+    let mut random = Random(2);
+    for _ in 0..1500 {
+        let mut mutated = mtl.as_bytes().to_vec();
+        for _ in 0..1 + random.below(3) {
+            let at = random.below(mutated.len());
+            match random.below(3) {
+                0 => mutated[at] ^= 1 << random.below(8),
+                1 => mutated.truncate(at.max(1)),
+                _ => mutated.insert(at, b"\n -1e9"[random.below(6)]),
+            }
+        }
+        fs::write(folder.path().join("a.mtl"), mutated).unwrap();
+        assert!(read_from(&folder, SAMPLE).is_ok());
+    }
+}
