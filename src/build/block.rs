@@ -15,7 +15,9 @@ use super::stages::{Stage, Stages};
 use crate::Result;
 use crate::format::{BlockInfo, OutputDir};
 use crate::mesh::{Model, Part, UpAxis, Warnings};
-use crate::texture::{BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan};
+use crate::texture::{
+    BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan, texture_factors,
+};
 
 /// A block whose nodes are written.
 #[derive(Debug)]
@@ -126,7 +128,9 @@ pub fn build_input(
         let texture_options =
             TextureOptions { jpeg_quality: options.jpeg_quality, max_atlas: options.max_atlas };
         let textures = stages.time(Stage::Pictures, || {
-            BlockTextures::prepare(&cache, shared, &piece.mesh, &factors, texture_options)
+            let level_factor = f64::from(options.hierarchy.level_factor);
+            let texel_factors = texture_factors(&factors, level_factor);
+            BlockTextures::prepare(&cache, shared, &piece.mesh, &texel_factors, texture_options)
         });
         let sink = DiskSink {
             textures: &textures,

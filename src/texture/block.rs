@@ -30,20 +30,17 @@ impl Default for TextureOptions {
     }
 }
 
-/// The least factor of the coarsest level above the source. With levels four apart all texels sum
-/// up to `1 + 4/3 / factor` times the source's: 1.52 times here, but 2.3 times for a level that
-/// simplifies hardly at all.
-const LEAST_REDUCTION: f64 = 2.56;
-
 /// Texture factors for levels with these simplification factors (the root's first, 1 last).
 ///
-/// The texel count follows the simplification factor, except where the level above the source
-/// has hardly fewer triangles than it: then all levels above the source are reduced further, by
-/// the same ratio, so that the sum of all texels stays bounded.
-pub fn texture_factors(simplifications: &[f64]) -> Vec<f64> {
+/// The thesis's `c_levelFactor` is the ratio of triangles *and of texels* between two successive
+/// levels, and its recursion ends at the first factor below 1, so the level above the original
+/// may have hardly fewer triangles than it. If its texels followed, all levels together would
+/// have up to `1 + 4/3 / factor` = 2.3 times the source's. So the ratio is kept here too: the
+/// texels of the level above the original are its own divided by the level factor, and so on up.
+pub fn texture_factors(simplifications: &[f64], level_factor: f64) -> Vec<f64> {
     let reduced = simplifications.iter().copied().filter(|factor| *factor > 1.0);
     let least = reduced.fold(f64::INFINITY, f64::min);
-    let ratio = (LEAST_REDUCTION / least).max(1.0);
+    let ratio = (level_factor / least).max(1.0);
     simplifications.iter().map(|factor| if *factor > 1.0 { factor * ratio } else { 1.0 }).collect()
 }
 
@@ -292,13 +289,13 @@ mod tests {
 
     #[test]
     fn texture_factors_bound_the_sum_of_all_texels() {
-        assert_eq!(texture_factors(&[48.0, 12.0, 3.0, 1.0]), [48.0, 12.0, 3.0, 1.0]);
-        assert_eq!(texture_factors(&[1.0]), [1.0]);
-        for least in [1.0001, 1.39, 2.0, 3.9] {
+        assert_eq!(texture_factors(&[64.0, 16.0, 4.0, 1.0], 4.0), [64.0, 16.0, 4.0, 1.0]);
+        assert_eq!(texture_factors(&[1.0], 4.0), [1.0]);
+        for least in [1.0001, 1.39, 2.0, 3.9, 4.0] {
             let factors: Vec<f64> =
                 (0..6).rev().map(|level| least * 4f64.powi(level)).chain([1.0]).collect();
-            let sum: f64 = texture_factors(&factors).iter().map(|factor| 1.0 / factor).sum();
-            assert!(sum < 1.53, "{least}: {sum}");
+            let sum: f64 = texture_factors(&factors, 4.0).iter().map(|factor| 1.0 / factor).sum();
+            assert!(sum < 4.0 / 3.0, "{least}: {sum}");
         }
     }
 }

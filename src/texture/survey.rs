@@ -120,7 +120,7 @@ fn survey() {
     if let Some(last) = factors.last_mut() {
         *last = 1.0;
     }
-    let factors = texture_factors(&factors);
+    let factors = texture_factors(&factors, 4.0);
     let shared = SharedTextures::new();
     let cache = TextureCache::new(&model, &plan, std::iter::once(0..model.materials.len() as u32));
     let start = Instant::now();
