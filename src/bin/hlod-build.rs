@@ -189,10 +189,11 @@ fn run(arguments: &BuildArgs) -> Result<()> {
     let bar = Bar::new(arguments.quiet);
     let outcome = with_threads(arguments.threads, || build(inputs, out, &options, &bar))?;
     bar.bar.finish_and_clear();
+    let outcome = outcome?;
     if arguments.quiet {
         return Ok(());
     }
-    print(&match outcome? {
+    print(&match outcome {
         Outcome::UpToDate(report) => build_summary::up_to_date(&report, out),
         Outcome::Built(report) => build_summary::built(&report, out),
     })
