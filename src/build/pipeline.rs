@@ -46,7 +46,9 @@ pub fn build(
     let begin = Instant::now();
     options.check()?;
     let inputs = import::find_inputs(arguments)?;
-    check_apart(out, &inputs)?;
+    // A folder that was given counts as a whole: what is built into it would be an input the next
+    // time.
+    check_apart(out, arguments.iter().chain(&inputs))?;
     let stages = Stages::default();
     let parameters = options.to_json();
 
