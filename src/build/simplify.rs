@@ -40,6 +40,8 @@ pub enum LadderStep {
     Permissive,
     /// Vertex clustering.
     Clustering,
+    /// The largest triangles alone, where simplification would leave nothing.
+    Remnant,
 }
 
 impl LadderStep {
@@ -50,6 +52,7 @@ impl LadderStep {
             Self::Collapse => "edge collapse within texture seams",
             Self::Permissive => "edge collapse across texture seams",
             Self::Clustering => "vertex clustering",
+            Self::Remnant => "the largest triangles alone",
         }
     }
 }
