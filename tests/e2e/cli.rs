@@ -361,7 +361,7 @@ fn inspect_refuses_what_is_no_result() {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 4;
     fs::write(&scene, &bytes).unwrap();
-    refused(path, &["inspect", "out"], INPUT, &["out/scene.hlod", "checksum"]);
+    refused(path, &["inspect", "out"], INPUT, &["out/scene.hlod", "CRC-32"]);
 }
 
 /// `hlod-build inspect --json out | head -1`: the pipe closes before all is written.

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use hlod::format::{NODES_DIR, file_crc};
+use hlod::format::{NODES_DIR, REPORT_FILE, file_crc};
 
 use crate::support::Random;
 use crate::support::inputs::{small_city, write_city};
@@ -32,6 +32,11 @@ fn leftovers(folder: &Path) -> Vec<String> {
         .collect();
     names.sort();
     names
+}
+
+/// True where an unfinished output has all its files.
+fn is_report_written(folder: &Path) -> bool {
+    leftovers(folder).iter().any(|name| folder.join(name).join(REPORT_FILE).exists())
 }
 
 #[test]
@@ -64,11 +69,18 @@ fn a_killed_build_leaves_a_whole_result() {
     let mut now = 1;
     let (mut old, mut new, mut unfinished) = (0, 0, 0);
     for kill in 0..KILLS {
-        // Evenly from 1 ms to somewhat past the end, each a little off.
-        let share = (kill as f64 + random.unit()) / KILLS as f64;
-        let wait = Duration::from_millis(1) + longest.mul_f64(share * 1.1);
         let mut child = start(sizes[1 - now]);
-        std::thread::sleep(wait);
+        let begin = Instant::now();
+        if kill % 2 == 0 {
+            // Evenly from 1 ms to the end, each a little off.
+            let share = (kill as f64 + random.unit()) / KILLS as f64;
+            std::thread::sleep(Duration::from_millis(1) + longest.mul_f64(share));
+        } else {
+            // Where the new result is complete and takes the old one's place.
+            while child.try_wait().unwrap().is_none() && !is_report_written(folder.path()) {}
+            std::thread::sleep(Duration::from_micros(random.below(3_000) as u64));
+        }
+        let wait = begin.elapsed();
         child.kill().unwrap();
         child.wait().unwrap();
         check_whole(&out);
@@ -87,6 +99,7 @@ fn a_killed_build_leaves_a_whole_result() {
         "{old} kills left the old result, {new} the new; {unfinished} left something unfinished"
     );
     assert!(old > 0 && unfinished > 0, "no kill met a running build");
+    assert!(new > 0, "no kill came after the new result");
 
     let mut last = start(sizes[1 - now]);
     assert!(last.wait().unwrap().success());

@@ -223,9 +223,17 @@ fn the_report_covers_what_was_taken_over() {
     let partly = report(&out);
     build(folder.path(), &["--force", "parts", "out"]);
     let whole = report(&out);
-    for part in
-        ["version", "parameters", "inputs", "source_triangles", "levels", "over_budget", "warnings"]
-    {
+    for part in [
+        "version",
+        "parameters",
+        "inputs",
+        "source_triangles",
+        "source_texels",
+        "levels",
+        "outcomes",
+        "over_budget",
+        "warnings",
+    ] {
         assert_eq!(partly[part], whole[part], "{part}");
     }
 }

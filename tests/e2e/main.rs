@@ -7,4 +7,8 @@ mod support;
 mod cli;
 mod crash;
 mod determinism;
+mod golden;
 mod incremental;
+mod output;
+mod real_data;
+mod soups;
