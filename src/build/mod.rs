@@ -21,6 +21,7 @@ pub mod merge;
 pub mod options;
 pub mod pipeline;
 pub mod progress;
+pub mod remnant;
 pub mod reuse;
 pub mod simplify;
 pub mod skirt;

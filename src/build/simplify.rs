@@ -47,6 +47,8 @@ pub enum LadderStep {
     Prune,
     /// Vertex clustering.
     Clustering,
+    /// The largest triangles alone, where simplification would leave nothing.
+    Remnant,
 }
 
 impl LadderStep {
@@ -58,6 +60,7 @@ impl LadderStep {
             Self::Permissive => "edge collapse across texture seams",
             Self::Prune => "edge collapse without the smallest separate parts",
             Self::Clustering => "vertex clustering",
+            Self::Remnant => "the largest triangles alone",
         }
     }
 }
