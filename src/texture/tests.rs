@@ -277,7 +277,7 @@ fn nodes(
     let cache = TextureCache::new(&scene.model, &plan, [materials]);
     let block = BlockTextures::prepare(&cache, &shared, &scene.mesh, factors, options);
     let nodes = (0..factors.len())
-        .map(|level| block.node_mesh(&scene.mesh, level, [1.0, 2.0, 3.0]).expect("builds"))
+        .map(|level| block.node_mesh(&scene.mesh, &[], level, [1.0, 2.0, 3.0]).expect("builds"))
         .collect();
     drop(block);
     (nodes, shared.into_files())
@@ -478,7 +478,7 @@ fn absurd_coordinates_and_missing_pictures_do_no_harm() {
     let cache = TextureCache::new(&scene.model, &plan, [[0u32, 1]]);
     let block = BlockTextures::prepare(&cache, &shared, &scene.mesh, &[9.0, 1.0], FINEST);
     for level in 0..2 {
-        let node = block.node_mesh(&scene.mesh, level, [0.0; 3]).expect("builds");
+        let node = block.node_mesh(&scene.mesh, &[], level, [0.0; 3]).expect("builds");
         let finite =
             |p: &crate::format::Primitive| p.texcoords.iter().flatten().all(|v| v.is_finite());
         assert!(node.mesh.primitives.iter().all(finite));
