@@ -74,7 +74,7 @@ fn node_file() -> Vec<u8> {
             },
         }],
     };
-    write_glb(&mesh, UpAxis::Z, NodeLabel { id: 1, level: 0, block: Some(0) }).unwrap()
+    write_glb(&mesh, UpAxis::Z, NodeLabel { id: 1, level: 0 }).unwrap()
 }
 
 fn scene_file() -> Vec<u8> {

@@ -166,11 +166,7 @@ fn mesh() -> impl Strategy<Value = NodeMesh> {
 }
 
 fn label() -> impl Strategy<Value = NodeLabel> {
-    (any::<u64>(), any::<u32>(), any::<Option<u32>>()).prop_map(|(id, level, block)| NodeLabel {
-        id,
-        level,
-        block,
-    })
+    (any::<u64>(), any::<u32>()).prop_map(|(id, level)| NodeLabel { id, level })
 }
 
 proptest! {

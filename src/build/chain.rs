@@ -177,8 +177,7 @@ fn chains_of<C>(vertices: &[BorderVertex<C>], edges: &[[u32; 2]]) -> Vec<Vec<u32
             if only_ends && !ends(vertex) {
                 continue;
             }
-            for place in 0..neighbours[vertex as usize].len() {
-                let first = neighbours[vertex as usize][place];
+            for &first in &neighbours[vertex as usize] {
                 if !used[first.1 as usize] {
                     runs.push(follow(vertex, first, &mut used));
                 }

@@ -148,7 +148,7 @@ fn over_budget(node: &NodeDraft, triangles: usize) -> Option<String> {
 }
 
 /// Two nodes with one id, which a hash of 48 bits makes unlikely.
-pub fn check_unique(ids: &mut Vec<(u64, String)>) -> Result<()> {
+pub fn check_unique(ids: &mut [(u64, String)]) -> Result<()> {
     ids.sort_unstable();
     match ids.windows(2).find(|pair| pair[0].0 == pair[1].0) {
         Some(pair) => Err(Error::Internal(format!(

@@ -10,6 +10,7 @@ pub mod compact;
 pub mod cut;
 pub mod disk_sink;
 pub mod distance;
+pub mod fold_untextured;
 pub mod forest;
 pub mod gather;
 pub mod hierarchy;

@@ -261,7 +261,7 @@ fn scene_of(
     if nodes.is_empty() {
         return Err(Error::Internal("a build without nodes".into()));
     }
-    let mut ids = nodes.iter().map(|node| (node.id, node.file.clone())).collect();
+    let mut ids: Vec<_> = nodes.iter().map(|node| (node.id, node.file.clone())).collect();
     check_unique(&mut ids)?;
     Ok(Scene {
         fingerprint: fingerprint(&parameters, reports),

@@ -1,0 +1,195 @@
+"""Measures hlod-build; see scripts/bench-build."""
+
+import argparse
+import os
+import re
+import statistics
+import subprocess
+
+from common import (
+    ROOT,
+    Programs,
+    machine,
+    quantity,
+    real_data,
+    say,
+    table,
+    texels_written,
+    write_between_markers,
+)
+
+# Of the generated cities: as in Cozzi & Loo's, 5.6 M triangles in 70 blocks.
+TRIANGLES_PER_BLOCK = 80_000
+TEXELS = 17
+# Of the thesis's data.
+THESIS_TEXELS = 105
+REAL = [
+    "sceaux",
+    "oblique_a",
+    "ingolstadt",
+    "torcs_street1",
+    "hamada",
+    "wageningen",
+    "lyon_roads",
+    "3dfier",
+]
+STAGES = ["compare", "import", "gather", "pictures", "cut", "simplify", "measure", "atlas", "write"]
+
+
+def main():
+    arguments = parse()
+    programs = Programs(examples=["jpeg_alone"])
+    threads = sorted({1, os.cpu_count()})
+    runs = measure_all(programs, arguments, threads)
+    text = [machine(), "", conditions(arguments), "", main_table(runs), stage_table(runs)]
+    text += [scaling(runs, threads), jpeg_table(programs, arguments, runs, threads)]
+    text = "\n".join(part.rstrip("\n") if part else "" for part in text) + "\n"
+    print(text)
+    if arguments.write:
+        write_between_markers(ROOT / "docs" / "benchmarks.md", "figures", text)
+
+
+def parse():
+    parser = argparse.ArgumentParser(prog="bench-build", description=__doc__)
+    parser.add_argument("--runs", type=int, default=3, help="the median of how many runs [3]")
+    parser.add_argument(
+        "--quick", action="store_true", help="0.2 M triangles, one run, nothing written to docs"
+    )
+    parser.add_argument("--no-real", action="store_true", help="generated cities only")
+    parser.add_argument(
+        "--no-write", dest="write", action="store_false", help="print only, leave docs as they are"
+    )
+    arguments = parser.parse_args()
+    if arguments.runs < 1:
+        parser.error("--runs must be at least 1")
+    if arguments.quick:
+        arguments.runs, arguments.write = 1, False
+    return arguments
+
+
+def measure_all(programs, arguments, threads):
+    """For each input and number of threads: its name, its texels and its median run."""
+    sizes = [200_000] if arguments.quick else [1_000_000, 4_000_000, 8_000_000]
+    cities = [(size, TEXELS) for size in sizes] + [(sizes[0], THESIS_TEXELS)]
+    inputs = []
+    for size, texels in cities:
+        city = programs.city(
+            f"city-{size}-{texels}",
+            blocks=max(1, round(size / TRIANGLES_PER_BLOCK)),
+            triangles=size,
+            texels_per_triangle=texels,
+        )
+        inputs.append((f"city, {size / 1e6:g} M, {texels} texels", size, texels, [city]))
+    if not arguments.no_real:
+        names = REAL[:2] if arguments.quick else REAL
+        inputs += [(name, None, None, models) for name in names if (models := real_data(name))]
+    runs = []
+    for name, size, texels, models in inputs:
+        for count in threads:
+            say(f"building {name} with {count} thread{'s' if count > 1 else ''}")
+            results = [programs.build(models, "--threads", count) for _ in range(arguments.runs)]
+            results.sort(key=lambda result: result["seconds"])
+            median = results[(len(results) - 1) // 2]
+            median["peak_bytes"] = max(result["peak_bytes"] for result in results)
+            runs.append(
+                {"name": name, "size": size, "texels": texels, "threads": count, "models": models}
+                | median
+            )
+    return runs
+
+
+def conditions(arguments):
+    return (
+        f"Median of {arguments.runs} run{'s' if arguments.runs > 1 else ''} into an empty folder, "
+        "default options, inputs in the page cache, wall time of the whole process. Peak memory is "
+        "the most that the process held in any run. *Texels* is what was written on all levels "
+        "against what the source's triangles use."
+    )
+
+
+def triangles(run):
+    return run["report"]["source_triangles"]
+
+
+def main_table(runs):
+    head = ["input", "threads", "triangles", "seconds", "triangles/s", "peak memory"]
+    head += ["bytes a triangle", "texels", "nodes"]
+    rows = []
+    for run in runs:
+        report = run["report"]
+        texels = texels_written(run) / report["source_texels"] if report["source_texels"] else None
+        rows.append(
+            [
+                run["name"],
+                str(run["threads"]),
+                f"{triangles(run):,}",
+                f"{run['seconds']:.2f}",
+                quantity(triangles(run) / run["seconds"]),
+                f"{run['peak_bytes'] / 1e6:.0f} MB",
+                f"{run['peak_bytes'] / triangles(run):.0f}",
+                f"{texels:.2f} ×" if texels else "–",
+                f"{sum(level['nodes'] for level in report['levels']):,}",
+            ]
+        )
+    return table(head, rows)
+
+
+def stage_table(runs):
+    rows = []
+    for run in runs:
+        seconds = {stage["stage"]: stage["seconds"] for stage in run["report"]["stages"]}
+        row = [run["name"], str(run["threads"])]
+        rows.append(row + [f"{seconds.get(stage, 0):.2f}" for stage in STAGES])
+    head = "\nSeconds of work in each stage, summed over the threads:\n\n"
+    return head + table(["input", "threads", *STAGES], rows)
+
+
+def scaling(runs, threads):
+    """What more threads and more triangles change."""
+    lines = []
+    cities = [run for run in runs if run["texels"] == TEXELS]
+    rates = {(run["size"], run["threads"]): triangles(run) / run["seconds"] for run in cities}
+    sizes = sorted({run["size"] for run in cities})
+    if len(threads) == 2:
+        speedups = [f"{rates[size, threads[1]] / rates[size, 1]:.2f}" for size in sizes]
+        named = ", ".join(f"{size / 1e6:g} M" for size in sizes)
+        times = ", ".join(speedups)
+        lines.append(f"- {threads[1]} threads against one, {named} triangles: {times} times as fast.")
+    if len(sizes) > 1:
+        small, large = rates[sizes[0], threads[-1]], rates[sizes[-1], threads[-1]]
+        lines.append(
+            f"- Triangles a second at {sizes[-1] / 1e6:g} M against {sizes[0] / 1e6:g} M: "
+            f"{large / small:.2f} times."
+        )
+    return "\n" + "\n".join(lines)
+
+
+def jpeg_table(programs, arguments, runs, threads):
+    """The build against decoding and encoding the same pictures and nothing else."""
+    rows = []
+    for run in (run for run in runs if run["texels"] == THESIS_TEXELS):
+        folder = run["models"][0].parent / "city_textures"
+        command = [programs.path("examples/jpeg_alone"), "--threads", str(run["threads"])]
+        seconds, texels = [], 0
+        for _ in range(arguments.runs):
+            text = subprocess.check_output([*command, str(folder)], text=True)
+            found = re.fullmatch(r"(\d+) pictures, (\d+) texels, ([\d.]+) s\n", text)
+            texels = int(found.group(2))
+            seconds.append(float(found.group(3)))
+        alone = statistics.median(seconds)
+        rows.append(
+            [
+                str(run["threads"]),
+                f"{texels / 1e6:.1f} M",
+                f"{alone:.2f}",
+                f"{run['seconds']:.2f}",
+                f"{run['seconds'] / alone:.2f} ×",
+            ]
+        )
+    head = ["threads", "texels", "JPEG alone, s", "whole build, s", "ratio"]
+    text = f"\nThe city with {THESIS_TEXELS} texels a triangle against decoding and encoding its "
+    return text + "pictures, by the same libraries, and nothing else:\n\n" + table(head, rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,154 @@
+"""What the scripts that measure share: building and running the programs, tables, the machine."""
+
+import json
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+DATA = ROOT.parent / "shared" / "data"
+
+
+class Programs:
+    """The programs in their release build, and a folder for what they make."""
+
+    def __init__(self, examples=()):
+        command = ["cargo", "build", "--release", "--locked", "--no-default-features", "--bins"]
+        command += [part for name in examples for part in ("--example", name)]
+        subprocess.run(command, cwd=ROOT, check=True)
+        text = subprocess.check_output(
+            ["cargo", "metadata", "--no-deps", "--format-version", "1", "--locked"], cwd=ROOT
+        )
+        self.target = Path(json.loads(text)["target_directory"])
+        self.work = self.target / "figures"
+        self.work.mkdir(parents=True, exist_ok=True)
+
+    def path(self, name):
+        return str(self.target / "release" / name)
+
+    def city(self, name, **options):
+        """A generated city, made once for each set of options."""
+        arguments = []
+        for option, value in options.items():
+            arguments.append("--" + option.replace("_", "-"))
+            if value is not True:
+                arguments.append(str(value))
+        folder = self.work / name
+        made_with = folder / "made-with.txt"
+        recipe = " ".join(arguments)
+        if not made_with.is_file() or made_with.read_text() != recipe:
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir(parents=True)
+            say(f"generating {name}")
+            run([self.path("make-city"), "--quiet", *arguments, str(folder / "city.obj")])
+            made_with.write_text(recipe)
+        return folder / "city.obj"
+
+    def build(self, inputs, *options):
+        """Runs hlod-build into an empty folder; returns what it took and what came out."""
+        out = self.work / "out"
+        shutil.rmtree(out, ignore_errors=True)
+        command = [self.path("hlod-build"), "--quiet", *map(str, options)]
+        took = run([*command, *map(str, inputs), str(out)])
+        report = json.loads((out / "build.json").read_text())
+        scene = json.loads(
+            subprocess.check_output([self.path("hlod-build"), "inspect", "--json", str(out)])
+        )
+        shutil.rmtree(out)
+        return {**took, "report": report, "scene": scene}
+
+
+def run(command):
+    """Runs a program to its end: its wall time in seconds and its peak memory in bytes."""
+    begin = time.monotonic()
+    process = subprocess.Popen(command)
+    _, status, usage = os.wait4(process.pid, 0)
+    seconds = time.monotonic() - begin
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        sys.exit(f"exit code {process.returncode} from {' '.join(command)}")
+    return {"seconds": seconds, "peak_bytes": usage.ru_maxrss * 1024}
+
+
+def say(text):
+    print(text, file=sys.stderr, flush=True)
+
+
+def real_data(name):
+    """Model files of one folder of the real data; empty, with a line, where it is absent."""
+    folder = DATA / name
+    models = sorted(path for path in folder.glob("*") if path.suffix.lower() in (".obj", ".glb"))
+    if not models:
+        say(f"skipped: no data set {name} in {os.path.relpath(DATA, ROOT)}")
+    return models
+
+
+def table(head, rows):
+    """A Markdown table: first column to the left, the others to the right."""
+    lines = ["| " + " | ".join(head) + " |"]
+    lines.append("|---|" + "---:|" * (len(head) - 1))
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def write_between_markers(file, marker, text):
+    """Replaces what is between `<!-- marker -->` and `<!-- /marker -->`."""
+    begin, end = f"<!-- {marker} -->", f"<!-- /{marker} -->"
+    old = file.read_text()
+    new, count = re.subn(
+        re.escape(begin) + ".*?" + re.escape(end),
+        lambda _: f"{begin}\n{text.rstrip()}\n{end}",
+        old,
+        flags=re.DOTALL,
+    )
+    if count != 1:
+        sys.exit(f"{file}: expected one {begin} … {end}, found {count}")
+    file.write_text(new)
+
+
+def machine():
+    """One paragraph: what the figures were measured on, when, and with what."""
+    version = subprocess.check_output(
+        ["git", "describe", "--always", "--dirty"], cwd=ROOT, text=True
+    ).strip()
+    manifest = (ROOT / "Cargo.toml").read_text()
+    package = re.search(r'^version = "(.*)"', manifest, re.MULTILINE).group(1)
+    compiler = subprocess.check_output(["rustc", "--version"], text=True).split()[1]
+    return (
+        f"{cpu_model()}, {os.cpu_count()} cores, {memory_bytes() / 2**30:.0f} GiB of memory, "
+        f"{platform.system()} {platform.release()}, rustc {compiler}; "
+        f"hlod {package} ({version}), {time.strftime('%Y-%m-%d')}."
+    )
+
+
+def cpu_model():
+    try:
+        text = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        return platform.processor() or "unknown processor"
+    found = re.search(r"^model name\s*:\s*(.*)$", text, re.MULTILINE)
+    return found.group(1).strip() if found else platform.machine()
+
+
+def memory_bytes():
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
+def texels_written(result):
+    """Texels of all nodes' own pictures and of those that they share."""
+    shared = result["scene"]["shared_textures"]
+    return sum(level["texels"] for level in result["report"]["levels"]) + sum(
+        picture["width"] * picture["height"] for picture in shared
+    )
+
+
+def quantity(number):
+    for size, unit in ((1e9, " G"), (1e6, " M"), (1e3, " k")):
+        if number >= size:
+            return f"{number / size:.3g}{unit}"
+    return f"{number:.0f}"
