@@ -94,7 +94,7 @@ struct BuildArgs {
     #[arg(long, value_name = "TEXELS", default_value_t = 4096, help_heading = "Textures")]
     max_atlas: u32,
 
-    /// Threads; 0 is one for each core. The result does not depend on it
+    /// Threads, 0-1024; 0 is one for each core. The result does not depend on it
     #[arg(long, short = 'j', value_name = "N", default_value_t = 0, help_heading = "Running")]
     threads: usize,
     /// Build even where nothing has changed
@@ -189,10 +189,11 @@ fn run(arguments: &BuildArgs) -> Result<()> {
     let bar = Bar::new(arguments.quiet);
     let outcome = with_threads(arguments.threads, || build(inputs, out, &options, &bar))?;
     bar.bar.finish_and_clear();
+    let outcome = outcome?;
     if arguments.quiet {
         return Ok(());
     }
-    print(&match outcome? {
+    print(&match outcome {
         Outcome::UpToDate(report) => build_summary::up_to_date(&report, out),
         Outcome::Built(report) => build_summary::built(&report, out),
     })

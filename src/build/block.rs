@@ -5,6 +5,7 @@ use std::path::Path;
 use super::blocks::{BlockPlan, Division, plan};
 use super::cut::Piece;
 use super::disk_sink::{DiskSink, NodeRecord};
+use super::fold_untextured::fold_untextured;
 use super::gather::{divide, gather, localise};
 use super::hierarchy::{BlockBuilder, Tree, simplifications};
 use super::lattice::Lattice;
@@ -90,6 +91,7 @@ pub fn build_input(
     progress: &dyn Progress,
 ) -> Result<BuiltInput> {
     let mut warnings = std::mem::take(&mut model.warnings);
+    fold_untextured(&mut model);
     let plans = plan(&model, options.blocks, options.hierarchy.desired_tris, up);
     let texture_plan = TexturePlan::new(&model);
     let drafts = stages.time(Stage::Gather, || drafts(&mut model, plans, options));

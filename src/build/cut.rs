@@ -85,10 +85,37 @@ pub fn cut<C: Coordinate>(piece: Piece<C>, cut: &Cut<C>) -> (Piece<C>, Piece<C>)
 }
 
 /// Triangles of the two sides, and the edges along which crossing triangles were split.
+#[derive(Default)]
 struct Halves {
     below: Vec<[u32; 3]>,
     above: Vec<[u32; 3]>,
+    /// Of `below` and `above`, those triangles that have a corner on the plane.
+    touching: [Vec<[u32; 3]>; 2],
     split_edges: Vec<[u32; 2]>,
+}
+
+impl Halves {
+    fn push_below(&mut self, triangle: [u32; 3], touches: bool) {
+        self.below.push(triangle);
+        if touches {
+            self.touching[0].push(triangle);
+        }
+    }
+
+    fn push_above(&mut self, triangle: [u32; 3], touches: bool) {
+        self.above.push(triangle);
+        if touches {
+            self.touching[1].push(triangle);
+        }
+    }
+
+    fn push(&mut self, triangle: [u32; 3], side: i8) {
+        if side == BELOW {
+            self.push_below(triangle, true);
+        } else {
+            self.push_above(triangle, true);
+        }
+    }
 }
 
 fn label<C: Coordinate>(mesh: &Mesh<C>, border: &Border, cut: &Cut<C>) -> Vec<i8> {
@@ -166,23 +193,20 @@ fn split<C: Coordinate>(
     let mut halves = Halves {
         below: Vec::with_capacity(triangles.len() / 2 + 64),
         above: Vec::with_capacity(triangles.len() / 2 + 64),
-        split_edges: Vec::new(),
+        ..Halves::default()
     };
     let mut made: FxHashMap<(u32, u32), u32> = FxHashMap::default();
     for triangle in triangles {
         let side = triangle.map(|vertex| labels[vertex as usize]);
         let (has_below, has_above) = (side.contains(&BELOW), side.contains(&ABOVE));
         match (has_below, has_above) {
-            (true, false) => halves.below.push(triangle),
-            (false, true) => halves.above.push(triangle),
+            (true, false) => halves.push_below(triangle, side.contains(&ON)),
+            (false, true) => halves.push_above(triangle, side.contains(&ON)),
             (false, false) => {
                 let sum: f64 =
                     triangle.iter().map(|&v| mesh.positions[v as usize][cut.axis].wide()).sum();
-                if sum / 3.0 < cut.coordinate.wide() {
-                    halves.below.push(triangle);
-                } else {
-                    halves.above.push(triangle);
-                }
+                let low = sum / 3.0 < cut.coordinate.wide();
+                halves.push(triangle, if low { BELOW } else { ABOVE });
             }
             (true, true) => {
                 let mut crossing = |from: u32, to: u32| {
@@ -198,7 +222,6 @@ fn split<C: Coordinate>(
             }
         }
     }
-    // Diagonals of the four-sided parts were chosen by index; nothing else depends on it.
     halves
 }
 
@@ -218,24 +241,14 @@ fn split_triangle(
     let [side_a, side_b] = [side[first], side[(first + 1) % 3]];
     if side_a == ON {
         let middle = crossing(b, c);
-        let (with_b, with_c) = if side_b == BELOW {
-            (&mut halves.below, &mut halves.above)
-        } else {
-            (&mut halves.above, &mut halves.below)
-        };
-        with_b.push([a, b, middle]);
-        with_c.push([a, middle, c]);
+        halves.push([a, b, middle], side_b);
+        halves.push([a, middle, c], -side_b);
         halves.split_edges.push([a, middle]);
     } else {
         let (to_b, to_c) = (crossing(a, b), crossing(a, c));
-        let (alone, pair) = if side_a == BELOW {
-            (&mut halves.below, &mut halves.above)
-        } else {
-            (&mut halves.above, &mut halves.below)
-        };
-        alone.push([a, to_b, to_c]);
-        pair.push([to_b, b, c]);
-        pair.push([to_b, c, to_c]);
+        halves.push([a, to_b, to_c], side_a);
+        halves.push([to_b, b, c], -side_a);
+        halves.push([to_b, c, to_c], -side_a);
         halves.split_edges.push([to_b, to_c]);
     }
 }
@@ -290,8 +303,8 @@ fn shared_positions<C: Coordinate>(
         }
         used
     };
-    let below = on_plane(&halves.below);
-    let mut shared = on_plane(&halves.above);
+    let below = on_plane(&halves.touching[0]);
+    let mut shared = on_plane(&halves.touching[1]);
     shared.retain(|position| below.contains(position));
     shared
 }
@@ -327,7 +340,7 @@ fn make_plane<C: Coordinate>(
         let (a, b) = (number_of(a), number_of(b));
         sides.insert([a.min(b), a.max(b)], BOTH);
     }
-    for (triangles, side) in [(&halves.below, 1u8), (&halves.above, 2u8)] {
+    for (triangles, side) in [(&halves.touching[0], 1u8), (&halves.touching[1], 2u8)] {
         for &[a, b, c] in triangles.iter() {
             let on = [a, b, c].map(|vertex| labels[vertex as usize] == ON);
             for (from, to, both) in

@@ -14,6 +14,7 @@ use super::cut::{Cut, CutTolerance, Piece, cut};
 use super::distance::hausdorff;
 use super::lattice::Lattice;
 use super::merge::merge;
+use super::remnant::remnant;
 use super::simplify::{AppearanceWeights, LadderStep, Simplified, Simplifier, simplify};
 use super::skirt::{Skirt, TRIANGLES_PER_SKIRT, skirts};
 use super::stages::{Stage, Stages};
@@ -342,7 +343,11 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             };
             let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
             let HierarchyOptions { simplifier, weights, .. } = *self.options;
-            let result = simplify(mesh, border, path, at, target, simplifier, weights);
+            let before = border.clone();
+            let mut result = simplify(mesh, border, path, at, target, simplifier, weights);
+            if result.mesh.triangles.is_empty() {
+                result = remnant(&source_mesh, &before, LEAST_TRIANGLES.min(target));
+            }
             // Simplification renumbers vertices, and clustering may take a border edge away.
             let skirts = match with_skirts {
                 true => skirts(&result.mesh, &result.border, path, at, step),

@@ -1,6 +1,7 @@
 //! What a result was built from, and whether that has changed.
 
 use std::fs::File;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -9,9 +10,8 @@ use crate::report::build_report::{FileReport, InputReport};
 use crate::{Error, Result};
 
 /// Sizes and hashes of the files of an input.
-pub fn describe(input: &Path, dependencies: &[PathBuf]) -> Result<InputReport> {
-    let files = dependencies.par_iter().map(|path| describe_file(path)).collect::<Result<_>>()?;
-    Ok(InputReport { path: text_of(input), files })
+pub fn describe(dependencies: &[PathBuf]) -> Result<Vec<FileReport>> {
+    dependencies.par_iter().map(|path| describe_file(path)).collect()
 }
 
 /// True where every file of an input is as it was.
@@ -19,14 +19,20 @@ pub fn unchanged(earlier: &InputReport) -> bool {
     !earlier.files.is_empty()
         && earlier.files.par_iter().all(|file| {
             let path = Path::new(&file.path);
-            let same_size = std::fs::metadata(path).is_ok_and(|facts| facts.len() == file.bytes);
-            same_size && describe_file(path).is_ok_and(|now| now == *file)
+            let size = std::fs::metadata(path).map_or(0, |facts| facts.len());
+            size == file.bytes && describe_file(path).is_ok_and(|now| now == *file)
         })
 }
 
 fn describe_file(path: &Path) -> Result<FileReport> {
     let failed = |error: std::io::Error| Error::input(path, format!("cannot be read: {error}"));
-    let file = File::open(path).map_err(failed)?;
+    let file = match File::open(path) {
+        // A file that a model names and that is not there: should it appear, that is a change.
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            return Ok(FileReport { path: text_of(path), ..FileReport::default() });
+        }
+        opened => opened.map_err(failed)?,
+    };
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(file).map_err(failed)?;
     Ok(FileReport {

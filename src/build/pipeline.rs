@@ -46,7 +46,9 @@ pub fn build(
     let begin = Instant::now();
     options.check()?;
     let inputs = import::find_inputs(arguments)?;
-    check_apart(out, &inputs)?;
+    // A folder that was given counts as a whole: what is built into it would be an input the next
+    // time.
+    check_apart(out, arguments.iter().chain(&inputs))?;
     let stages = Stages::default();
     let parameters = options.to_json();
 
@@ -67,22 +69,17 @@ pub fn build(
 
     let output = OutputDir::create(out)?;
     let shared = SharedTextures::new();
-    let mut warnings = Warnings::default();
-    let mut reports = Vec::with_capacity(inputs.len());
+    let mut reports: Vec<InputReport> = Vec::with_capacity(inputs.len());
     let mut blocks: Vec<BuiltBlock> = Vec::new();
-    let mut ups = Vec::new();
-    let mut source = SourceFigures::default();
     let mut reused_textures: BTreeMap<String, SharedTexture> = BTreeMap::new();
     let mut ahead: Option<Result<Model>> = None;
 
     for (number, input) in inputs.iter().enumerate() {
         if let (Some(report), Some(earlier)) = (&still_good[number], &earlier) {
             let taken = earlier.take_over(report, &output)?;
-            source.triangles += taken.source_triangles;
-            progress.built(taken.source_triangles);
+            progress.built(report.triangles);
             reused_textures.extend(taken.shared_textures);
             blocks.extend(taken.blocks);
-            ups.push(earlier.scene.up);
             reports.push(report.clone());
             continue;
         }
@@ -101,7 +98,7 @@ pub fn build(
                 // Only the input that comes next in turn, and only where both fit in memory.
                 still_good.get(number + 1).is_some_and(Option::is_none) && fits_beside(input, next)
             });
-        let report = stages.time(Stage::Compare, || describe(input, &model.dependencies))?;
+        let files = stages.time(Stage::Compare, || describe(&model.dependencies))?;
         let triangles = model.triangle_count() as u64;
         progress.found(triangles);
         let up = options.up.or(model.up).unwrap_or_else(|| super::up::guess(&model));
@@ -111,15 +108,24 @@ pub fn build(
         );
         ahead = read_ahead;
         let built = built?;
-        warnings.extend(built.warnings);
-        source.add(triangles, built.used_texels);
+        let mut warnings = built.warnings;
+        let outcomes = outcomes(&built.blocks, &mut warnings);
+        reports.push(InputReport {
+            path: text_of(input),
+            files,
+            triangles,
+            texels: built.used_texels,
+            up,
+            outcomes,
+            warnings: Count::of_warnings(&warnings),
+        });
         blocks.extend(built.blocks);
-        ups.push(up);
-        reports.push(report);
     }
     progress.finishing();
 
-    source.used_texels += shared.source_texels();
+    let source_triangles = reports.iter().map(|input| input.triangles).sum();
+    let source_texels =
+        reports.iter().map(|input| input.texels).sum::<u64>() + shared.source_texels();
     let mut shared_textures = reused_textures;
     for file in shared.into_files() {
         let texture = SharedTexture {
@@ -132,12 +138,16 @@ pub fn build(
             output.write(format!("{TEXTURES_DIR}/{}", file.name), &file.bytes)?;
         }
     }
-    let facts = NodeFacts::of(&blocks, &mut warnings);
-    let up = agreed_up(&ups, &mut warnings);
+    let mut warnings = Warnings::default();
+    for warning in reports.iter().flat_map(|input| &input.warnings) {
+        warnings.add(&warning.text, warning.count);
+    }
+    let over_budget = over_budget(&blocks, &mut warnings);
+    let up = agreed_up(&reports, &mut warnings);
     let scene = scene_of(blocks, shared_textures, parameters.clone(), up, &reports)?;
 
     let mut levels = level_reports(&scene);
-    for over in &facts.over_budget {
+    for over in &over_budget {
         if let Some(node) = scene.nodes.iter().find(|node| node.id == over.id) {
             levels[node.level as usize].over_budget += 1;
         }
@@ -145,36 +155,23 @@ pub fn build(
     let report = BuildReport {
         version: env!("CARGO_PKG_VERSION").into(),
         parameters,
-        inputs: reports,
-        source_triangles: source.triangles,
-        source_texels: source.used_texels,
+        source_triangles,
+        source_texels,
         levels,
         stages: Stage::ALL
             .map(|stage| StageReport { stage: stage.name().into(), seconds: stages.seconds(stage) })
             .to_vec(),
         seconds: begin.elapsed().as_secs_f64(),
         peak_memory_bytes: super::memory::peak_bytes(),
-        outcomes: facts.outcomes,
-        over_budget: facts.over_budget,
-        warnings: warnings.iter().map(|(text, count)| Count { text: text.into(), count }).collect(),
+        outcomes: most_frequent(reports.iter().flat_map(|input| &input.outcomes).cloned()),
+        inputs: reports,
+        over_budget,
+        warnings: Count::of_warnings(&warnings),
     };
     output.write(SCENE_FILE, &scene.to_bytes()?)?;
     output.write(REPORT_FILE, report.to_json()?.as_bytes())?;
     output.commit()?;
     Ok(Outcome::Built(report))
-}
-
-#[derive(Default)]
-struct SourceFigures {
-    triangles: u64,
-    used_texels: u64,
-}
-
-impl SourceFigures {
-    fn add(&mut self, triangles: u64, texels: u64) {
-        self.triangles += triangles;
-        self.used_texels += texels;
-    }
 }
 
 /// An input is read while the one before it is built, unless both are large: a file's model takes
@@ -185,9 +182,9 @@ fn fits_beside(current: &Path, next: &Path) -> bool {
 }
 
 /// One direction for the whole scene; the first input's where they differ.
-fn agreed_up(ups: &[UpAxis], warnings: &mut Warnings) -> UpAxis {
-    let first = ups.first().copied().unwrap_or(UpAxis::Z);
-    let others = ups.iter().filter(|&&up| up != first).count() as u64;
+fn agreed_up(inputs: &[InputReport], warnings: &mut Warnings) -> UpAxis {
+    let first = inputs.first().map_or(UpAxis::Z, |input| input.up);
+    let others = inputs.iter().filter(|input| input.up != first).count() as u64;
     warnings.add(
         format!("input with another up axis than the first ({first:?}); set --up to choose one"),
         others,
@@ -195,47 +192,54 @@ fn agreed_up(ups: &[UpAxis], warnings: &mut Warnings) -> UpAxis {
     first
 }
 
-/// What the report says about nodes.
-struct NodeFacts {
-    outcomes: Vec<Count>,
-    over_budget: Vec<OverBudget>,
+/// How the nodes of an input were made; what was imperfect in them is added to `warnings`.
+fn outcomes(blocks: &[BuiltBlock], warnings: &mut Warnings) -> Vec<Count> {
+    let mut steps = Vec::new();
+    for block in blocks {
+        block.for_each(&mut |record: &NodeRecord| {
+            steps.extend(record.step.map(|step| Count { text: step.describe().into(), count: 1 }));
+            warnings.extend(record.warnings.clone());
+        });
+    }
+    most_frequent(steps)
 }
 
-impl NodeFacts {
-    fn of(blocks: &[BuiltBlock], warnings: &mut Warnings) -> Self {
-        let mut outcomes: BTreeMap<&'static str, u64> = BTreeMap::new();
-        let mut over_budget = Vec::new();
-        for block in blocks {
-            block.for_each(&mut |record: &NodeRecord| {
-                if let Some(step) = record.step {
-                    *outcomes.entry(step.describe()).or_insert(0) += 1;
-                }
-                warnings.extend(record.warnings.clone());
-                if let Some(reason) = &record.reason {
-                    over_budget.push(OverBudget {
-                        id: record.id,
-                        file: record.file.clone(),
-                        budget: record.budget as u64,
-                        triangles: u64::from(record.attributes.triangles),
-                        reason: reason.clone(),
-                    });
-                }
-            });
-        }
-        over_budget.sort_by_key(|over| over.id);
-        let mut outcomes: Vec<Count> =
-            outcomes.into_iter().map(|(text, count)| Count { text: text.into(), count }).collect();
-        outcomes.sort_by_key(|outcome| std::cmp::Reverse(outcome.count));
-        warnings.add(
-            format!(
-                "node with more than {:.0} % above its triangle budget (see over_budget in {})",
-                (BUDGET_TOLERANCE - 1.0) * 100.0,
-                REPORT_FILE
-            ),
-            over_budget.len() as u64,
-        );
-        Self { outcomes, over_budget }
+/// Sums up equal texts; the most frequent first, then by text.
+fn most_frequent(counts: impl IntoIterator<Item = Count>) -> Vec<Count> {
+    let mut sums: BTreeMap<String, u64> = BTreeMap::new();
+    for Count { text, count } in counts {
+        *sums.entry(text).or_insert(0) += count;
     }
+    let mut sums: Vec<Count> =
+        sums.into_iter().map(|(text, count)| Count { text, count }).collect();
+    sums.sort_by_key(|sum| std::cmp::Reverse(sum.count));
+    sums
+}
+
+/// The nodes that have more triangles than they may, by id.
+fn over_budget(blocks: &[BuiltBlock], warnings: &mut Warnings) -> Vec<OverBudget> {
+    let mut over_budget = Vec::new();
+    for block in blocks {
+        block.for_each(&mut |record: &NodeRecord| {
+            over_budget.extend(record.reason.clone().map(|reason| OverBudget {
+                id: record.id,
+                file: record.file.clone(),
+                budget: record.budget as u64,
+                triangles: u64::from(record.attributes.triangles),
+                reason,
+            }));
+        });
+    }
+    over_budget.sort_by_key(|over| over.id);
+    warnings.add(
+        format!(
+            "node with more than {:.0} % above its triangle budget (see over_budget in {})",
+            (BUDGET_TOLERANCE - 1.0) * 100.0,
+            REPORT_FILE
+        ),
+        over_budget.len() as u64,
+    );
+    over_budget
 }
 
 /// Joins the blocks' trees to a scene.

@@ -27,8 +27,6 @@ pub struct Taken {
     pub blocks: Vec<BuiltBlock>,
     /// Shared textures that its nodes use, by name; likewise.
     pub shared_textures: BTreeMap<String, SharedTexture>,
-    /// Triangles of its leaves.
-    pub source_triangles: u64,
 }
 
 impl Earlier {
@@ -59,8 +57,7 @@ impl Earlier {
 
     /// Links the files of an input's blocks into the new output.
     pub fn take_over(&self, input: &InputReport, output: &OutputDir) -> Result<Taken> {
-        let mut taken =
-            Taken { blocks: Vec::new(), shared_textures: BTreeMap::new(), source_triangles: 0 };
+        let mut taken = Taken { blocks: Vec::new(), shared_textures: BTreeMap::new() };
         for root in self.scene.roots() {
             let Some(block) = self.scene.nodes[root as usize].block else { continue };
             let info = &self.scene.blocks[block as usize];
@@ -97,9 +94,6 @@ impl Earlier {
             .children(index)
             .map(|child| self.tree(child, output, taken))
             .collect::<Result<Vec<_>>>()?;
-        if children.is_empty() {
-            taken.source_triangles += u64::from(node.triangles);
-        }
         let over = self.report.over_budget.iter().find(|over| over.id == node.id);
         Ok(Tree {
             record: NodeRecord {

@@ -3,9 +3,13 @@
 //! 1. Quadric edge collapse with attributes (Garland & Heckbert as meshoptimizer has it, with
 //!    vertex positions and attributes solved for afterwards), inside texture seams.
 //! 2. The same, allowed to collapse across texture seams but not across material borders.
-//! 3. Vertex clustering ([`super::cluster`]), which has no topology to respect.
+//! 3. The same, also leaving out the smallest separate parts; or vertex clustering
+//!    ([`super::cluster`]), which has no topology to respect: whichever is measured to stay nearer
+//!    to the input.
 //!
 //! Border vertices that the level keeps are locked throughout.
+
+use std::cmp::Ordering;
 
 use meshopt::{SimplifyOptions, SimplifyVertex};
 use rustc_hash::FxHashMap;
@@ -13,6 +17,7 @@ use rustc_hash::FxHashMap;
 use super::border::{Border, Fate, Path};
 use super::cluster::cluster;
 use super::compact::compact;
+use super::distance::mean_distance;
 use crate::mesh::{Mesh, PositionKey, key};
 
 /// Which method makes the coarse levels.
@@ -38,8 +43,12 @@ pub enum LadderStep {
     Collapse,
     /// Edge collapse across texture seams.
     Permissive,
+    /// Edge collapse across texture seams, with the smallest separate parts left out.
+    Prune,
     /// Vertex clustering.
     Clustering,
+    /// The largest triangles alone, where simplification would leave nothing.
+    Remnant,
 }
 
 impl LadderStep {
@@ -49,7 +58,9 @@ impl LadderStep {
             Self::Original => "original geometry",
             Self::Collapse => "edge collapse within texture seams",
             Self::Permissive => "edge collapse across texture seams",
+            Self::Prune => "edge collapse without the smallest separate parts",
             Self::Clustering => "vertex clustering",
+            Self::Remnant => "the largest triangles alone",
         }
     }
 }
@@ -120,13 +131,28 @@ pub fn simplify(
         if best.mesh.triangles.len() <= limit {
             return best;
         }
-        if step == LadderStep::Collapse && source.mesh.texcoords.is_empty() {
-            // Without textures the only seams are material borders, which stay protected.
-            break;
+    }
+    let pruned =
+        collapse(&source.mesh, &source.border, &locked, target, LadderStep::Prune, weights);
+    let clustered = clustered(&source.mesh, &source.border, &locked, target);
+    // Within the budget and nearest to the input; else the fewest triangles.
+    let rank = |candidate: &Simplified| {
+        let triangles = candidate.mesh.triangles.len();
+        if triangles <= limit {
+            (0, mean_distance(&source.mesh, &candidate.mesh))
+        } else {
+            (1, triangles as f64)
+        }
+    };
+    let mut best = (rank(&best), best);
+    for candidate in [pruned, clustered] {
+        let rank = rank(&candidate);
+        if !candidate.mesh.triangles.is_empty() && rank.partial_cmp(&best.0) == Some(Ordering::Less)
+        {
+            best = (rank, candidate);
         }
     }
-    let result = clustered(&source.mesh, &source.border, &locked, target);
-    if result.mesh.triangles.len() < best.mesh.triangles.len() { result } else { best }
+    best.1
 }
 
 fn clustered(mesh: &Mesh, border: &Border, locked: &[bool], target: usize) -> Simplified {
@@ -152,9 +178,12 @@ fn collapse(
         .map(|&locked| if locked { SimplifyVertex::Lock } else { SimplifyVertex::None })
         .collect();
     let mut options = SimplifyOptions::ErrorAbsolute;
-    if step == LadderStep::Permissive {
+    if step != LadderStep::Collapse {
         options |= SimplifyOptions::Permissive;
         protect_material_borders(mesh, &mut locks);
+    }
+    if step == LadderStep::Prune {
+        options |= SimplifyOptions::Prune;
     }
     let mut error = 0f32;
     let count = meshopt::simplify_with_update(
@@ -176,15 +205,11 @@ fn collapse(
         texcoords: mesh.texcoords.clone(),
         colors: mesh.colors.clone(),
         materials: mesh.materials.clone(),
-        triangles: bytemuck::allocation::cast_vec(indices_to_triangles(indices)),
+        triangles: indices.as_chunks::<3>().0.to_vec(),
     };
     write_attributes(&mut result, &attributes, attribute_weights.len());
     let (mesh, border) = compact(&result, border);
     Simplified { mesh, border, error: f64::from(error), step }
-}
-
-fn indices_to_triangles(indices: Vec<u32>) -> Vec<[u32; 3]> {
-    indices.as_chunks::<3>().0.to_vec()
 }
 
 /// meshoptimizer scales positions to a unit box and back, so a vertex that it did not move may

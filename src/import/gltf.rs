@@ -78,6 +78,7 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Model, String> {
     }
     scene.tally.report(path, &mut scene.warnings);
     dependencies.extend(scene.makers.textures.dependencies());
+    dependencies.extend(scene.finder.absent());
     Ok(Model {
         source: path.to_path_buf(),
         dependencies,

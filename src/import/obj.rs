@@ -481,6 +481,7 @@ impl<'a> Obj<'a> {
         }
         self.tally.report(self.path, &mut self.warnings);
         self.dependencies.extend(self.textures.dependencies());
+        self.dependencies.extend(self.finder.absent());
         super::assemble(Model {
             source: self.path.to_path_buf(),
             dependencies: self.dependencies,

@@ -12,13 +12,15 @@ pub(super) struct Finder {
     /// Files of the model's folder and the usual ones below it by lower-case name, listed when
     /// first needed.
     listing: Option<BTreeMap<String, PathBuf>>,
+    /// See [`Finder::absent`].
+    absent: Vec<PathBuf>,
 }
 
 impl Finder {
     /// For the model at `model`.
     pub(super) fn new(model: &Path) -> Self {
         let folder = model.parent().unwrap_or(Path::new("")).to_path_buf();
-        Self { folder, listing: None }
+        Self { folder, listing: None, absent: Vec::new() }
     }
 
     /// The file that `name` means: as written (relative to the model's folder); with backslashes
@@ -33,12 +35,24 @@ impl Finder {
         let components: Vec<&str> =
             slashed.split('/').filter(|part| !part.is_empty() && *part != ".").collect();
         let ends = (0..components.len()).map(|from| components[from..].join("/"));
-        [name.to_owned(), slashed.clone()]
+        let found = [name.to_owned(), slashed.clone()]
             .into_iter()
             .chain(ends)
             .map(|candidate| self.folder.join(candidate))
             .find(|candidate| candidate.is_file())
-            .or_else(|| self.listing().get(&components.last()?.to_lowercase()).cloned())
+            .or_else(|| self.listing().get(&components.last()?.to_lowercase()).cloned());
+        if found.is_none() {
+            let base_name = components.last().map(|&name| name.to_owned());
+            let places = [Some(slashed.clone()), base_name].into_iter().flatten();
+            self.absent.extend(places.map(|place| self.folder.join(place)));
+        }
+        found
+    }
+
+    /// Where files that were asked for and not found would be looked for first: should one appear
+    /// there, the model is another.
+    pub(super) fn absent(self) -> Vec<PathBuf> {
+        self.absent
     }
 
     fn listing(&mut self) -> &BTreeMap<String, PathBuf> {

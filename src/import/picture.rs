@@ -34,6 +34,36 @@ pub struct Picture {
     pub pixels: Vec<u8>,
 }
 
+impl Picture {
+    /// The number of texels.
+    pub fn texels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+
+    /// Without its alpha channel.
+    pub fn into_opaque(self) -> Self {
+        if self.channels == 3 {
+            return self;
+        }
+        Self { channels: 3, pixels: without_alpha(&self.pixels), ..self }
+    }
+
+    /// True where some texel is not wholly opaque.
+    pub fn has_transparency(&self) -> bool {
+        self.channels == 4 && has_transparency(&self.pixels)
+    }
+}
+
+/// Of RGBA texels: true where some alpha is below 255.
+fn has_transparency(rgba: &[u8]) -> bool {
+    rgba.as_chunks::<4>().0.iter().any(|texel| texel[3] < 255)
+}
+
+/// RGB of RGBA texels.
+fn without_alpha(rgba: &[u8]) -> Vec<u8> {
+    rgba.as_chunks::<4>().0.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect()
+}
+
 /// Reads and decodes a texture: JPEG, PNG, and the other formats that `image` is built with.
 ///
 /// 16-bit, grey and palette pictures become 8-bit RGB. The result is RGBA only where some alpha is
@@ -162,11 +192,10 @@ fn from_image(image: DynamicImage) -> Picture {
     let (width, height) = (image.width(), image.height());
     if image.color().has_alpha() {
         let pixels = image.into_rgba8().into_raw();
-        if pixels.as_chunks::<4>().0.iter().any(|texel| texel[3] < 255) {
+        if has_transparency(&pixels) {
             return Picture { width, height, channels: 4, pixels };
         }
-        let pixels = pixels.as_chunks::<4>().0.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect();
-        return Picture { width, height, channels: 3, pixels };
+        return Picture { width, height, channels: 3, pixels: without_alpha(&pixels) };
     }
     Picture { width, height, channels: 3, pixels: image.into_rgb8().into_raw() }
 }

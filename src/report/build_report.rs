@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::mesh::{UpAxis, Warnings};
 use crate::{Error, Result};
 
 /// The contents of `build.json`.
@@ -15,7 +16,8 @@ pub struct BuildReport {
     pub inputs: Vec<InputReport>,
     /// Triangles of all inputs after import.
     pub source_triangles: u64,
-    /// Different texels of the source that its triangles use; 0 where inputs were taken over.
+    /// Different texels of the source that its triangles use. Of repeating textures only those
+    /// of the inputs that were built, not of those that were taken over.
     pub source_texels: u64,
     /// One entry a level, the roots' first.
     pub levels: Vec<LevelReport>,
@@ -33,13 +35,23 @@ pub struct BuildReport {
     pub warnings: Vec<Count>,
 }
 
-/// An input of the command line.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// An input of the command line. Whoever takes over its nodes takes over all of this with them.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputReport {
     /// As given, or as found in a given folder.
     pub path: String,
-    /// All files that were read for it: the model, its materials, its pictures.
+    /// All files that were read for it or that it names: the model, its materials, its pictures.
     pub files: Vec<FileReport>,
+    /// Its triangles after import.
+    pub triangles: u64,
+    /// Different texels that its triangles use, repeating textures aside.
+    pub texels: u64,
+    /// Which of its axes points at the sky.
+    pub up: UpAxis,
+    /// How often each step of the ladder made one of its nodes, most frequent first.
+    pub outcomes: Vec<Count>,
+    /// What was imperfect in it and how often, in the order in which it was met.
+    pub warnings: Vec<Count>,
 }
 
 /// A file that was read.
@@ -47,9 +59,9 @@ pub struct InputReport {
 pub struct FileReport {
     /// Its path.
     pub path: String,
-    /// Its size.
+    /// Its size; 0 where it was not there.
     pub bytes: u64,
-    /// BLAKE3 of its contents, in hexadecimal.
+    /// BLAKE3 of its contents, in hexadecimal; empty where it was not there.
     pub blake3: String,
 }
 
@@ -88,6 +100,13 @@ pub struct Count {
     pub text: String,
     /// How often.
     pub count: u64,
+}
+
+impl Count {
+    /// The entries of a list of warnings.
+    pub fn of_warnings(warnings: &Warnings) -> Vec<Self> {
+        warnings.iter().map(|(text, count)| Self { text: text.into(), count }).collect()
+    }
 }
 
 /// A node that missed its budget.

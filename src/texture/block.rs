@@ -8,10 +8,10 @@ use super::bits::BitGrid;
 use super::cache::{Decoded, TextureCache};
 use super::charts::{Charts, UvBox};
 use super::level::{self, LevelPicture, Region};
-use super::picture::Picture;
 use super::plan::{self, TextureUse};
 use super::raster::Rasterizer;
 use super::shared::SharedTextures;
+use crate::import::Picture;
 use crate::mesh::{Mesh, Model};
 
 /// What of the texture work can be chosen.

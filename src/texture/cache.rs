@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use super::picture::{self, Picture};
 use super::plan::TexturePlan;
+use crate::import::{self, Picture};
 use crate::mesh::{Model, Warnings};
 
 /// A decoded picture and what names it.
@@ -101,7 +101,7 @@ impl<'a> TextureCache<'a> {
 
     fn decode(&self, texture: u32) -> State {
         let source = &self.model.textures[texture as usize];
-        let picture = match picture::decode_texture(source) {
+        let picture = match import::decode_texture(source) {
             Ok(picture) => picture,
             Err(error) => return State::Failed(error.to_string()),
         };

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::bits::BitGrid;
 use super::fill;
-use super::picture::Picture;
 use super::scale::{self, LinearImage, Rows, Weights};
 use super::srgb;
+use crate::import::Picture;
 
 /// How far, in texels, the source's own texels are extended into unused ones: as far as a node's
 /// atlas copies texels around a chart (half a cell of reach and the rest of the last cell).

@@ -125,8 +125,8 @@ fn sanitised_stem(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::picture::Picture;
     use super::*;
+    use crate::import::Picture;
 
     fn decoded(width: u32, height: u32) -> Decoded {
         let pixels = (0..width * height * 3).map(|i| (i * 31) as u8).collect::<Vec<u8>>();

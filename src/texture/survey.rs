@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use super::*;
 use crate::format::NodeImageData;
+use crate::import::decode_texture;
 use crate::mesh::{Group, Material, Mesh, Model, Part, TextureData, TextureSource};
 
 /// Reads an OBJ just well enough for measuring.

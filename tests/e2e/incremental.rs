@@ -1,0 +1,348 @@
+//! Building again: nothing where nothing changed, and only what changed where something did.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use hlod::city::{self, CityOptions};
+use tempfile::TempDir;
+
+use crate::support::inputs::{SQUARE, small_city, write, write_city, write_street};
+use crate::support::result::{contents, difference, lasting, report};
+use crate::support::{hlod_build, run_build};
+
+/// Three models, `parts/block_0000.obj` and so on, each with its material file and picture.
+fn three_parts() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let options = CityOptions { blocks: 3, triangles: 7_500, split: true, ..small_city() };
+    city::write(&options, &folder.path().join("parts")).unwrap();
+    folder
+}
+
+const SMALL_NODES: [&str; 2] = ["--desired-tris", "250"];
+
+/// Builds the parts, or what `arguments` say, into `out`.
+fn build(folder: &Path, arguments: &[&str]) -> String {
+    run_build(folder, &[&SMALL_NODES[..], arguments].concat())
+}
+
+fn is_up_to_date(text: &str) -> bool {
+    text.contains("up to date")
+}
+
+/// What a file is, beyond its bytes: which one, and when written.
+fn identities(out: &Path) -> BTreeMap<PathBuf, (u64, i64, i64)> {
+    contents(out)
+        .into_keys()
+        .map(|name| {
+            let facts = fs::metadata(out.join(&name)).unwrap();
+            (name.into(), (facts.ino(), facts.mtime(), facts.mtime_nsec()))
+        })
+        .collect()
+}
+
+/// Node files of one part by inode.
+fn nodes_of(out: &Path, part: &str) -> BTreeMap<PathBuf, u64> {
+    let nodes: BTreeMap<PathBuf, u64> = identities(out)
+        .into_iter()
+        .filter(|(name, _)| name.to_str().unwrap().contains(part))
+        .map(|(name, (inode, _, _))| (name, inode))
+        .collect();
+    assert!(nodes.len() > 3, "{part} has {} nodes", nodes.len());
+    nodes
+}
+
+/// What a build of the same arguments makes where nothing was before. Only `build.json` may tell
+/// the two apart.
+fn clean_build(folder: &Path, arguments: &[&str]) -> BTreeMap<String, Vec<u8>> {
+    let arguments: Vec<&str> = arguments
+        .iter()
+        .map(|&argument| if argument == "out" { "clean" } else { argument })
+        .collect();
+    build(folder, &arguments);
+    let mut result = lasting(&folder.join("clean"));
+    fs::remove_dir_all(folder.join("clean")).unwrap();
+    result.remove("build.json");
+    result
+}
+
+fn without_report(out: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut result = lasting(out);
+    result.remove("build.json");
+    result
+}
+
+#[test]
+fn the_same_again_touches_nothing() {
+    let folder = three_parts();
+    let out = folder.path().join("out");
+    assert!(!is_up_to_date(&build(folder.path(), &["parts", "out"])));
+    let (before, bytes) = (identities(&out), contents(&out));
+    let folder_before = fs::metadata(&out).unwrap();
+    for arguments in [
+        &["parts", "out"][..],
+        &["parts/block_0002.obj", "parts/block_0000.obj", "parts/block_0001.obj", "out"],
+        &["parts", "parts/block_0001.obj", "out/"],
+        &["--threads", "1", "parts", "out"],
+    ] {
+        let text = build(folder.path(), arguments);
+        assert!(is_up_to_date(&text), "{arguments:?}: {text}");
+        assert_eq!(identities(&out), before, "{arguments:?}");
+    }
+    assert_eq!(difference(&bytes, &contents(&out)), None);
+    let folder_after = fs::metadata(&out).unwrap();
+    assert_eq!(folder_before.ino(), folder_after.ino());
+    assert_eq!(folder_before.mtime_nsec(), folder_after.mtime_nsec());
+}
+
+#[test]
+fn a_touched_but_unchanged_input_is_unchanged() {
+    let folder = three_parts();
+    build(folder.path(), &["parts", "out"]);
+    let input = folder.path().join("parts/block_0001.obj");
+    fs::write(&input, fs::read(&input).unwrap()).unwrap();
+    assert!(is_up_to_date(&build(folder.path(), &["parts", "out"])));
+}
+
+#[test]
+fn force_builds_all_the_same() {
+    let folder = three_parts();
+    let out = folder.path().join("out");
+    build(folder.path(), &["parts", "out"]);
+    let (before, result) = (identities(&out), lasting(&out));
+    assert!(!is_up_to_date(&build(folder.path(), &["--force", "parts", "out"])));
+    let after = identities(&out);
+    assert!(after.iter().all(|(name, (inode, _, _))| before[name].0 != *inode), "a file was kept");
+    assert_eq!(difference(&result, &lasting(&out)), None);
+}
+
+#[test]
+fn every_parameter_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    write_city(folder.path(), &small_city());
+    let out = folder.path().join("out");
+    run_build(folder.path(), &["city.obj", "out"]);
+    for option in [
+        ["--desired-tris", "600"],
+        ["--level-factor", "2"],
+        ["--blocks", "grid:40"],
+        ["--blocks", "groups"],
+        ["--simplifier", "clustering"],
+        ["--simplify-from", "original"],
+        ["--borders", "locked"],
+        ["--borders", "shared"],
+        ["--jpeg-quality", "70"],
+        ["--max-atlas", "64"],
+        ["--up", "y"],
+    ] {
+        let arguments = [&option[..], &["city.obj", "out"]].concat();
+        let text = run_build(folder.path(), &arguments);
+        assert!(!is_up_to_date(&text), "{option:?}");
+        assert!(is_up_to_date(&run_build(folder.path(), &arguments)), "{option:?}");
+        let again = [&option[..], &["city.obj", "clean"]].concat();
+        run_build(folder.path(), &again);
+        assert_eq!(
+            difference(&lasting(&out), &lasting(&folder.path().join("clean"))),
+            None,
+            "{option:?}"
+        );
+    }
+}
+
+/// Changes each kind of file that the second of three models is made of.
+#[test]
+fn only_a_changed_input_is_built_again() {
+    for (file, change) in
+        [("block_0001.obj", "model"), ("block_0001.mtl", "material"), ("block_0001.jpg", "picture")]
+    {
+        let folder = three_parts();
+        let out = folder.path().join("out");
+        build(folder.path(), &["parts", "out"]);
+        let others = [nodes_of(&out, "block_0000"), nodes_of(&out, "block_0002")];
+        let changed = nodes_of(&out, "block_0001");
+        let before = without_report(&out);
+        let path = folder.path().join("parts").join(file);
+        match change {
+            "picture" => {
+                let image = image::open(&path).unwrap();
+                image.rotate180().to_rgb8().save(&path).unwrap();
+            }
+            "model" => {
+                let text = fs::read_to_string(&path).unwrap();
+                let shorter: Vec<&str> = text.lines().collect();
+                let last = shorter.iter().rposition(|line| line.starts_with("f ")).unwrap();
+                let kept = [&shorter[..last], &shorter[last + 1..]].concat().join("\n");
+                fs::write(&path, kept).unwrap();
+            }
+            _ => {
+                let text = fs::read_to_string(&path).unwrap();
+                fs::write(&path, text.replace("Kd ", "Kd 0.9 0.1 0.1\n# was ")).unwrap();
+            }
+        }
+        assert!(!is_up_to_date(&build(folder.path(), &["parts", "out"])), "{change}");
+        assert_eq!(nodes_of(&out, "block_0000"), others[0], "{change}: the same files");
+        assert_eq!(nodes_of(&out, "block_0002"), others[1], "{change}: the same files");
+        let rebuilt = nodes_of(&out, "block_0001");
+        assert!(rebuilt.values().all(|inode| !changed.values().any(|old| old == inode)));
+        let after = without_report(&out);
+        assert!(difference(&before, &after).is_some(), "{change} has no effect");
+        let clean = clean_build(folder.path(), &["parts", "out"]);
+        assert_eq!(difference(&clean, &after), None, "{change}");
+        assert!(is_up_to_date(&build(folder.path(), &["parts", "out"])), "{change}");
+    }
+}
+
+#[test]
+fn inputs_come_and_go() {
+    let folder = three_parts();
+    let out = folder.path().join("out");
+    let (a, b, c) = ("parts/block_0000.obj", "parts/block_0001.obj", "parts/block_0002.obj");
+    build(folder.path(), &[a, b, "out"]);
+    let kept = nodes_of(&out, "block_0001");
+    for arguments in [&[b, c, "out"][..], &[a, b, c, "out"], &[b, "out"], &["parts", "out"]] {
+        assert!(!is_up_to_date(&build(folder.path(), arguments)), "{arguments:?}");
+        assert_eq!(nodes_of(&out, "block_0001"), kept, "{arguments:?}: the same files");
+        let clean = clean_build(folder.path(), arguments);
+        assert_eq!(difference(&clean, &without_report(&out)), None, "{arguments:?}");
+    }
+}
+
+/// A report of a build that took inputs over says what that of a clean build says.
+#[test]
+fn the_report_covers_what_was_taken_over() {
+    let folder = three_parts();
+    let out = folder.path().join("out");
+    let path = folder.path().join("parts/block_0002.obj");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, format!("{text}v 1 2 3\n")).unwrap();
+    build(folder.path(), &["parts", "out"]);
+    let first = folder.path().join("parts/block_0000.obj");
+    fs::write(&first, fs::read_to_string(&first).unwrap() + "# a remark\n").unwrap();
+    build(folder.path(), &["parts", "out"]);
+    let partly = report(&out);
+    build(folder.path(), &["--force", "parts", "out"]);
+    let whole = report(&out);
+    for part in [
+        "version",
+        "parameters",
+        "inputs",
+        "source_triangles",
+        "source_texels",
+        "levels",
+        "outcomes",
+        "over_budget",
+        "warnings",
+    ] {
+        assert_eq!(partly[part], whole[part], "{part}");
+    }
+}
+
+/// Two models share a repeating picture; one of them changes.
+#[test]
+fn shared_pictures_stay_while_anyone_uses_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    write_street(folder.path(), 24);
+    let text = fs::read_to_string(folder.path().join("street.obj")).unwrap();
+    write(folder.path(), "avenue.obj", &text);
+    build(folder.path(), &["street.obj", "avenue.obj", "out"]);
+    let textures =
+        |out: &Path| contents(out).into_keys().filter(|name| name.starts_with("textures/")).count();
+    assert!(textures(&out) > 0, "the street's pictures repeat");
+    write(folder.path(), "avenue.obj", format!("{text}\n# changed"));
+    for arguments in [
+        &["street.obj", "avenue.obj", "out"][..],
+        &["avenue.obj", "out"],
+        &["street.obj", "avenue.obj", "out"],
+    ] {
+        build(folder.path(), arguments);
+        let clean = clean_build(folder.path(), arguments);
+        assert_eq!(difference(&clean, &without_report(&out)), None, "{arguments:?}");
+    }
+    // When the picture itself changes, everything that shows it does.
+    image::RgbImage::from_pixel(64, 32, image::Rgb([9, 200, 9]))
+        .save(folder.path().join("brick.png"))
+        .unwrap();
+    build(folder.path(), &["street.obj", "avenue.obj", "out"]);
+    let clean = clean_build(folder.path(), &["street.obj", "avenue.obj", "out"]);
+    assert_eq!(difference(&clean, &without_report(&out)), None);
+    // Without its user, a picture goes.
+    write(folder.path(), "bare.obj", SQUARE);
+    build(folder.path(), &["bare.obj", "out"]);
+    assert_eq!(textures(&out), 0);
+}
+
+#[test]
+fn a_picture_that_was_missing_is_used_once_it_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    write_street(folder.path(), 10);
+    let picture = folder.path().join("brick.png");
+    let bytes = fs::read(&picture).unwrap();
+    fs::remove_file(&picture).unwrap();
+    let text = build(folder.path(), &["street.obj", "out"]);
+    assert!(text.contains("brick.png"), "a warning: {text}");
+    fs::write(&picture, bytes).unwrap();
+    assert!(!is_up_to_date(&build(folder.path(), &["street.obj", "out"])));
+    let clean = clean_build(folder.path(), &["street.obj", "out"]);
+    assert_eq!(difference(&clean, &without_report(&folder.path().join("out"))), None);
+    // And the other way round.
+    fs::remove_file(&picture).unwrap();
+    assert!(!is_up_to_date(&build(folder.path(), &["street.obj", "out"])));
+    let clean = clean_build(folder.path(), &["street.obj", "out"]);
+    assert_eq!(difference(&clean, &without_report(&folder.path().join("out"))), None);
+}
+
+#[test]
+fn a_damaged_result_is_built_again() {
+    let folder = tempfile::tempdir().unwrap();
+    write_street(folder.path(), 24);
+    let out = folder.path().join("out");
+    build(folder.path(), &["street.obj", "out"]);
+    let whole = lasting(&out);
+    let some = |start: &str| out.join(whole.keys().find(|name| name.starts_with(start)).unwrap());
+    let damage: [(&str, &dyn Fn()); 8] = [
+        ("a node is missing", &|| fs::remove_file(some("nodes/")).unwrap()),
+        ("a node is shorter", &|| {
+            let path = some("nodes/");
+            let bytes = fs::read(&path).unwrap();
+            fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
+        }),
+        ("a picture is missing", &|| fs::remove_file(some("textures/")).unwrap()),
+        ("a picture is empty", &|| fs::write(some("textures/"), "").unwrap()),
+        ("the scene is cut", &|| {
+            let bytes = fs::read(out.join("scene.hlod")).unwrap();
+            fs::write(out.join("scene.hlod"), &bytes[..bytes.len() / 2]).unwrap();
+        }),
+        ("a bit of the scene is wrong", &|| {
+            let mut bytes = fs::read(out.join("scene.hlod")).unwrap();
+            let middle = bytes.len() / 2;
+            bytes[middle] ^= 1;
+            fs::write(out.join("scene.hlod"), bytes).unwrap();
+        }),
+        ("the report is missing", &|| fs::remove_file(out.join("build.json")).unwrap()),
+        ("the report is no JSON", &|| fs::write(out.join("build.json"), "{").unwrap()),
+    ];
+    for (what, damage) in damage {
+        damage();
+        let text = build(folder.path(), &["street.obj", "out"]);
+        assert!(!is_up_to_date(&text), "{what}");
+        assert_eq!(difference(&whole, &lasting(&out)), None, "{what}");
+    }
+}
+
+/// An input that was there and is gone is an error, and the result stays.
+#[test]
+fn a_lost_input_leaves_the_result() {
+    let folder = three_parts();
+    build(folder.path(), &["parts/block_0000.obj", "parts/block_0001.obj", "out"]);
+    let before = contents(&folder.path().join("out"));
+    fs::remove_file(folder.path().join("parts/block_0001.obj")).unwrap();
+    hlod_build()
+        .current_dir(&folder)
+        .args(SMALL_NODES)
+        .args(["parts/block_0000.obj", "parts/block_0001.obj", "out"])
+        .assert()
+        .code(3);
+    assert_eq!(difference(&before, &contents(&folder.path().join("out"))), None);
+}

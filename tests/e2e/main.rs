@@ -1,0 +1,14 @@
+//! End to end: models in, `out/` read back, as a user of the program or of the library would.
+//!
+//! One test program with a module for each promise, so that the library is linked once.
+
+mod support;
+
+mod cli;
+mod crash;
+mod determinism;
+mod golden;
+mod incremental;
+mod output;
+mod real_data;
+mod soups;

@@ -1,0 +1,111 @@
+//! The real data sets, where they are present: `HLOD_DATA`, or `../shared/data` beside the
+//! repository.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use hlod::build::BuildOptions;
+use hlod::{Error, import};
+
+use crate::support::build_with;
+use crate::support::geometry::area;
+use crate::support::result::{Built, report};
+
+const DESIRED_TRIS: u64 = 900;
+
+/// The data, or `None`, said once a set.
+fn data(set: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("HLOD_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
+    let path = folder.join(set);
+    if path.exists() {
+        return Some(path);
+    }
+    println!("skipped: {} is not there", path.display());
+    None
+}
+
+/// The area of a model as imported.
+fn source_area(inputs: &[PathBuf]) -> f64 {
+    let models = inputs.iter().map(|input| import::load(input).unwrap());
+    models
+        .flat_map(|model| model.parts)
+        .map(|part| {
+            let corner = |vertex: u32| DVec3::from(part.positions[vertex as usize]);
+            let triangles = part.indices.chunks_exact(3);
+            triangles.map(|t| area([corner(t[0]), corner(t[1]), corner(t[2])])).sum::<f64>()
+        })
+        .sum()
+}
+
+fn check(set: &str) {
+    let Some(path) = data(set) else { return };
+    let inputs = match import::find_inputs(&[path]) {
+        Err(Error::Input { what, .. }) => panic!("{set}: {what}"),
+        found => found.unwrap(),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    build_with(&inputs, &out, &BuildOptions::default());
+    let built = Built::read(&out);
+    assert_eq!(built.scene.check(), []);
+
+    let (leaves, source) = (built.leaf_area(), source_area(&inputs));
+    assert!(
+        (leaves / source - 1.0).abs() < 1e-6,
+        "{set}: the leaves have {leaves} m², the source {source} m²"
+    );
+
+    let report = report(&out);
+    let over = report["over_budget"].as_array().unwrap();
+    for entry in over {
+        assert!(!entry["reason"].as_str().unwrap().is_empty(), "{set}: {entry}");
+        assert!(entry["triangles"].as_f64() > entry["budget"].as_f64(), "{set}: {entry}");
+    }
+    // A root's budget is known from outside: it is the desired number itself.
+    for root in built.scene.roots() {
+        let node = &built.scene.nodes[root as usize];
+        let excused = over.iter().any(|entry| entry["id"] == node.id);
+        let most = (DESIRED_TRIS as f64 * 1.1).ceil();
+        assert!(
+            f64::from(node.triangles) <= most || excused,
+            "{set}: {} has {} triangles and no reason",
+            node.file,
+            node.triangles
+        );
+    }
+    println!(
+        "{set}: {} nodes, {} of them over budget, {} s",
+        built.scene.nodes.len(),
+        over.len(),
+        report["seconds"]
+    );
+}
+
+macro_rules! sets {
+    ($($name:ident: $set:literal,)*) => {
+        $(#[test]
+        fn $name() {
+            check($set);
+        })*
+    };
+}
+
+sets! {
+    sceaux: "sceaux",
+    oblique_a: "oblique_a",
+    ingolstadt: "ingolstadt",
+    torcs_street1: "torcs_street1",
+    hamada: "hamada",
+    wageningen: "wageningen",
+    lyon_roads: "lyon_roads",
+    a_3dfier_terrain: "3dfier",
+    lyon_nasty: "lyon_nasty",
+    sceaux_glb: "glb/sceaux.glb",
+    oblique_a_glb: "glb/oblique_a.glb",
+    ingolstadt_glb: "glb/ingolstadt.glb",
+    street1_glb: "glb/street1.glb",
+    wageningen_glb: "glb/wageningen.glb",
+}
