@@ -123,7 +123,7 @@ fn bad_inputs_are_refused_by_name() {
     let path = folder.path();
     write(path, "city.fbx", "not a model");
     write(path, "prose.obj", "This is a letter, dear Sir.\nIt holds no mesh at all.\n");
-    write(path, "noise.obj", (0u32..2000).map(|n| (n * n >> 3) as u8).collect::<Vec<_>>());
+    write(path, "noise.obj", (0u32..2000).map(|n| ((n * n) >> 3) as u8).collect::<Vec<_>>());
     write(path, "empty.obj", "");
     write(path, "points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
     write(path, "range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n\n# a line\nf 1 2 4\n");

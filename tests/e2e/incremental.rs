@@ -6,6 +6,8 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use hlod::city::{self, CityOptions};
+use hlod::format::Scene;
+use hlod::mesh::UpAxis;
 use tempfile::TempDir;
 
 use crate::support::inputs::{SQUARE, small_city, write, write_city, write_street};
@@ -345,4 +347,19 @@ fn a_lost_input_leaves_the_result() {
         .assert()
         .code(3);
     assert_eq!(difference(&before, &contents(&folder.path().join("out"))), None);
+}
+
+/// An OBJ with z up and a GLB with y up, of which one goes.
+#[test]
+fn the_up_axis_is_that_of_the_inputs_that_are_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    write_street(folder.path(), 10);
+    city::write(&small_city(), &folder.path().join("zoo.glb")).unwrap();
+    build(folder.path(), &["street.obj", "zoo.glb", "out"]);
+    assert_eq!(Scene::read(&out).unwrap().up, UpAxis::Z, "the first input's");
+    build(folder.path(), &["zoo.glb", "out"]);
+    assert_eq!(Scene::read(&out).unwrap().up, UpAxis::Y);
+    let clean = clean_build(folder.path(), &["zoo.glb", "out"]);
+    assert_eq!(difference(&clean, &without_report(&out)), None);
 }
