@@ -7,8 +7,8 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use hlod::import::decode_texture;
 use hlod::mesh::{TextureData, TextureSource};
-use hlod::texture::decode_texture;
 use jpeg_encoder::{ColorType, Encoder};
 use rayon::prelude::*;
 

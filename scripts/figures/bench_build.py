@@ -41,19 +41,26 @@ def main():
     programs = Programs(examples=["jpeg_alone"])
     threads = sorted({1, os.cpu_count()})
     runs = measure_all(programs, arguments, threads)
-    text = [machine(), "", conditions(arguments), "", main_table(runs), stage_table(runs)]
-    text += [scaling(runs, threads), jpeg_table(programs, arguments, runs, threads)]
-    text = "\n".join(part.rstrip("\n") if part else "" for part in text) + "\n"
-    print(text)
+    cities = [run for run in runs if run["texels"]]
+    findings = [scaling(runs, threads), jpeg_table(programs, arguments, runs, threads)]
+    about = [machine(), conditions(arguments)]
+    short = paragraphs(about + [main_table(cities)] + findings)
+    full = paragraphs(about + [main_table(runs), stage_table(runs)] + findings)
+    print(full)
     if arguments.write:
-        write_between_markers(ROOT / "docs" / "benchmarks.md", "figures", text)
+        write_between_markers(ROOT / "docs" / "benchmarks.md", "figures", full)
+        write_between_markers(ROOT / "README.md", "figures", short)
+
+
+def paragraphs(parts):
+    return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
 def parse():
     parser = argparse.ArgumentParser(prog="bench-build", description=__doc__)
     parser.add_argument("--runs", type=int, default=3, help="the median of how many runs [3]")
     parser.add_argument(
-        "--quick", action="store_true", help="0.2 M triangles, one run, nothing written to docs"
+        "--quick", action="store_true", help="0.2 M triangles, one run, nothing written"
     )
     parser.add_argument("--no-real", action="store_true", help="generated cities only")
     parser.add_argument(
@@ -140,7 +147,7 @@ def stage_table(runs):
         seconds = {stage["stage"]: stage["seconds"] for stage in run["report"]["stages"]}
         row = [run["name"], str(run["threads"])]
         rows.append(row + [f"{seconds.get(stage, 0):.2f}" for stage in STAGES])
-    head = "\nSeconds of work in each stage, summed over the threads:\n\n"
+    head = "Seconds of work in each stage, summed over the threads:\n\n"
     return head + table(["input", "threads", *STAGES], rows)
 
 
@@ -161,7 +168,7 @@ def scaling(runs, threads):
             f"- Triangles a second at {sizes[-1] / 1e6:g} M against {sizes[0] / 1e6:g} M: "
             f"{large / small:.2f} times."
         )
-    return "\n" + "\n".join(lines)
+    return "\n".join(lines)
 
 
 def jpeg_table(programs, arguments, runs, threads):
@@ -187,7 +194,7 @@ def jpeg_table(programs, arguments, runs, threads):
             ]
         )
     head = ["threads", "texels", "JPEG alone, s", "whole build, s", "ratio"]
-    text = f"\nThe city with {THESIS_TEXELS} texels a triangle against decoding and encoding its "
+    text = f"The city with {THESIS_TEXELS} texels a triangle against decoding and encoding its "
     return text + "pictures, by the same libraries, and nothing else:\n\n" + table(head, rows)
 
 

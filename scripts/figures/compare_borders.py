@@ -56,7 +56,7 @@ def parse():
     parser = argparse.ArgumentParser(prog="compare-borders", description=__doc__)
     parser.add_argument("--runs", type=int, default=1, help="the fastest of how many runs [1]")
     parser.add_argument(
-        "--quick", action="store_true", help="0.1 M triangles, nothing written to docs"
+        "--quick", action="store_true", help="0.1 M triangles, nothing written"
     )
     parser.add_argument("--no-real", action="store_true", help="the generated city only")
     parser.add_argument(

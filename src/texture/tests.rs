@@ -7,6 +7,7 @@ use super::atlas::{Atlas, Page, Sheet, SheetPicture};
 use super::level::{LevelPicture, Region, level_pictures};
 use super::*;
 use crate::format::{NodeImageData, NodeMesh};
+use crate::import::Picture;
 use crate::mesh::{
     AlphaMode, Group, Material, Mesh, Model, Part, TextureData, TextureSource, Wrap,
 };
