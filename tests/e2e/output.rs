@@ -333,7 +333,7 @@ fn geometric_errors_are_not_below_the_measured_distance() {
 }
 
 #[test]
-#[ignore = "the build samples too few points for this: it misses up to a tenth of the distance"]
+#[ignore = "the build samples too few points for this: by clustering it misses up to a sixth"]
 fn geometric_errors_are_not_below_the_distance_measured_densely() {
     let too_low: Vec<String> =
         cases().iter().flat_map(|case| errors_too_low(case, 4_000)).collect();
