@@ -13,6 +13,7 @@ use super::options::BuildOptions;
 use super::pipeline::in_parallel;
 use super::progress::Progress;
 use super::stages::{Stage, Stages};
+use super::stray::set_strays_aside;
 use crate::Result;
 use crate::format::{BlockInfo, OutputDir};
 use crate::mesh::{Model, Part, UpAxis, Warnings};
@@ -53,6 +54,8 @@ pub struct BuiltInput {
 /// A block about to be gathered.
 struct Draft {
     name: String,
+    /// Strays, on a lattice of their own.
+    far: bool,
     source: DraftSource,
     materials: Vec<u32>,
 }
@@ -95,7 +98,7 @@ pub fn build_input(
     let plans = plan(&model, options.blocks, options.hierarchy.desired_tris, up);
     let texture_plan = TexturePlan::new(&model);
     let drafts = stages.time(Stage::Gather, || drafts(&mut model, plans, options));
-    let lattice = lattice_of(&drafts);
+    let common = lattice_of(drafts.iter().filter(|draft| !draft.far));
     let cache = TextureCache::new(
         &model,
         &texture_plan,
@@ -103,6 +106,7 @@ pub fn build_input(
     );
     let prefix = file_prefix(&model.source);
     let built = in_parallel(drafts, |number, draft| {
+        let lattice = if draft.far { lattice_of([&draft]) } else { common };
         let Draft { name, source, .. } = draft;
         let (low, high) = source.bounds();
         let origin = lattice.origin_near(std::array::from_fn(|i| (low[i] + high[i]) * 0.5));
@@ -168,11 +172,15 @@ fn drafts(model: &mut Model, plans: Vec<BlockPlan>, options: &BuildOptions) -> V
     let mut drafts = Vec::with_capacity(plans.len());
     for BlockPlan { name, parts: numbers, divide: division } in plans {
         let parts: Vec<Part> = numbers.iter().filter_map(|&number| parts[number].take()).collect();
+        let (parts, far) = set_strays_aside(&parts).unwrap_or((parts, Vec::new()));
+        if !far.is_empty() {
+            let name = format!("{name} (far off)");
+            let materials = materials_of(far.iter().map(|part| part.material).collect());
+            drafts.push(Draft { name, far: true, source: DraftSource::Parts(far), materials });
+        }
         if division == Division::Whole {
-            let mut materials: Vec<u32> = parts.iter().map(|part| part.material).collect();
-            materials.sort_unstable();
-            materials.dedup();
-            drafts.push(Draft { name, source: DraftSource::Parts(parts), materials });
+            let materials = materials_of(parts.iter().map(|part| part.material).collect());
+            drafts.push(Draft { name, far: false, source: DraftSource::Parts(parts), materials });
             continue;
         }
         let piece = gather(&model.materials, &parts);
@@ -187,18 +195,24 @@ fn drafts(model: &mut Model, plans: Vec<BlockPlan>, options: &BuildOptions) -> V
         let pieces = divide(piece, division, &shares);
         let several = pieces.len() > 1;
         for (number, piece) in pieces.into_iter().enumerate() {
-            let mut materials = piece.mesh.materials.clone();
-            materials.sort_unstable();
-            materials.dedup();
+            let materials = materials_of(piece.mesh.materials.clone());
             let name = if several { format!("{name} {}", number + 1) } else { name.clone() };
-            drafts.push(Draft { name, source: DraftSource::Piece(Box::new(piece)), materials });
+            let source = DraftSource::Piece(Box::new(piece));
+            drafts.push(Draft { name, far: false, source, materials });
         }
     }
     drafts
 }
 
+/// Each material once.
+fn materials_of(mut materials: Vec<u32>) -> Vec<u32> {
+    materials.sort_unstable();
+    materials.dedup();
+    materials
+}
+
 /// One lattice for all blocks of an input, so that blocks that touch agree on where.
-fn lattice_of(drafts: &[Draft]) -> Lattice {
+fn lattice_of<'a>(drafts: impl IntoIterator<Item = &'a Draft>) -> Lattice {
     let (mut extent, mut magnitude) = (0f64, 0f64);
     for draft in drafts {
         let (low, high) = draft.source.bounds();

@@ -12,7 +12,7 @@ use crate::mesh::{Mesh, PositionKey, key};
 
 /// The measured distance is multiplied by this, since the farthest point of a surface need not be
 /// one of the samples.
-pub const SAMPLING_ALLOWANCE: f64 = 1.5;
+pub const SAMPLING_ALLOWANCE: f64 = 2.0;
 
 /// Points that are tried in each direction; evenly spread over the vertices in question.
 const MOST_SAMPLES: usize = 320;

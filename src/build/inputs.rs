@@ -57,9 +57,8 @@ pub fn fingerprint(parameters: &serde_json::Value, inputs: &[InputReport]) -> [u
     add(env!("CARGO_PKG_VERSION"));
     add(&parameters.to_string());
     for input in inputs {
-        // Contents, not places: the same city in another folder is the same city.
-        let name = Path::new(&input.path).file_name().unwrap_or_default();
-        add(&name.to_string_lossy());
+        // As given: it is part of the nodes' file names and ids.
+        add(&input.path);
         for file in &input.files {
             add(&file.blake3);
         }

@@ -27,6 +27,7 @@ pub mod reuse;
 pub mod simplify;
 pub mod skirt;
 pub mod stages;
+pub mod stray;
 pub mod thin_border;
 pub mod up;
 
