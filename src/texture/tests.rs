@@ -7,6 +7,7 @@ use super::atlas::{Atlas, Page, Sheet, SheetPicture};
 use super::level::{LevelPicture, Region, level_pictures};
 use super::*;
 use crate::format::{NodeImageData, NodeMesh};
+use crate::import::Picture;
 use crate::mesh::{
     AlphaMode, Group, Material, Mesh, Model, Part, TextureData, TextureSource, Wrap,
 };
@@ -99,7 +100,7 @@ fn whole(picture: Picture) -> LevelPicture {
         size: [picture.width as usize, picture.height as usize],
         covered: None,
     };
-    level_pictures(&std::sync::Arc::new(picture), &region, &[1.0]).remove(0)
+    level_pictures(std::sync::Arc::new(picture), &region, &[1.0]).remove(0)
 }
 
 fn inside([a, b, c]: [[f64; 2]; 3], random: &mut Random) -> [f64; 2] {
@@ -277,7 +278,7 @@ fn nodes(
     let cache = TextureCache::new(&scene.model, &plan, [materials]);
     let block = BlockTextures::prepare(&cache, &shared, &scene.mesh, factors, options);
     let nodes = (0..factors.len())
-        .map(|level| block.node_mesh(&scene.mesh, level, [1.0, 2.0, 3.0]).expect("builds"))
+        .map(|level| block.node_mesh(&scene.mesh, &[], level, [1.0, 2.0, 3.0]).expect("builds"))
         .collect();
     drop(block);
     (nodes, shared.into_files())
@@ -478,7 +479,7 @@ fn absurd_coordinates_and_missing_pictures_do_no_harm() {
     let cache = TextureCache::new(&scene.model, &plan, [[0u32, 1]]);
     let block = BlockTextures::prepare(&cache, &shared, &scene.mesh, &[9.0, 1.0], FINEST);
     for level in 0..2 {
-        let node = block.node_mesh(&scene.mesh, level, [0.0; 3]).expect("builds");
+        let node = block.node_mesh(&scene.mesh, &[], level, [0.0; 3]).expect("builds");
         let finite =
             |p: &crate::format::Primitive| p.texcoords.iter().flatten().all(|v| v.is_finite());
         assert!(node.mesh.primitives.iter().all(finite));
