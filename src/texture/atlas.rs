@@ -192,13 +192,21 @@ impl Sheet<'_> {
             size[axis] = end.saturating_sub(start).max(1);
         }
         let mut grid = BitGrid::new(size[0], size[1]);
-        let mut rasterizer = Rasterizer::default();
         let start = first.map(|cell| cell as f64);
-        for triangle in triangles {
-            let corners = picture.corners[*triangle as usize]
-                .map(|at| [at[0] * scale - start[0], at[1] * scale - start[1]]);
-            rasterizer.mark(corners, &mut grid);
+        let to_cells = |at: [f64; 2]| [0, 1].map(|axis| at[axis] * scale - start[axis]);
+        let filled = if triangles.len() == picture.corners.len() {
+            picture.filled_charts()
+        } else {
+            Vec::new()
+        };
+        for bounds in filled.iter().flatten() {
+            raster::mark_box(to_cells(bounds.min), to_cells(bounds.max), &mut grid);
         }
+        let others = triangles.iter().map(|triangle| *triangle as usize).filter(|triangle| {
+            !matches!(filled.get(picture.charts[*triangle] as usize), Some(Some(_)))
+        });
+        let others = others.map(|triangle| picture.corners[triangle].map(to_cells));
+        Rasterizer::default().mark_all(others, &mut grid);
         (first.map(|cell| cell * self.cell as isize), grid)
     }
 
@@ -266,6 +274,24 @@ impl Sheet<'_> {
             page.fill_empty_cells(owned, self.cell);
         }
         Atlas { pages, places, patches: assigned }
+    }
+}
+
+impl SheetPicture<'_> {
+    /// By chart: its box, where its triangles fill it.
+    fn filled_charts(&self) -> Vec<Option<UvBox>> {
+        let count = self.charts.iter().max().map_or(0, |chart| *chart as usize + 1);
+        let mut charts = vec![(UvBox::EMPTY, 0.0); count];
+        for (chart, corners) in self.charts.iter().zip(&self.corners) {
+            let (bounds, sum) = &mut charts[*chart as usize];
+            corners.iter().for_each(|corner| bounds.add(*corner));
+            *sum += area(corners);
+        }
+        let filled = |(bounds, sum): (UvBox, f64)| {
+            let sides = [0, 1].map(|axis| bounds.max[axis] - bounds.min[axis]);
+            (sides[0] >= 0.0 && raster::fills(sides, sum)).then_some(bounds)
+        };
+        charts.into_iter().map(filled).collect()
     }
 }
 

@@ -59,6 +59,24 @@ impl BitGrid {
         }
     }
 
+    /// On a grid of this size whose cells are `step` as wide: each that some set cell overlaps.
+    pub fn coarser(&self, step: f64, width: usize, height: usize) -> Self {
+        let mut coarse = Self::new(width, height);
+        // What overlaps by a thousandth is rounding.
+        let span = |start: usize, end: usize, limit: usize| {
+            let first = ((start as f64 / step + 1e-3) as usize).min(limit - 1);
+            (first, ((end as f64 / step - 1e-3).ceil() as usize).clamp(first + 1, limit))
+        };
+        for y in 0..self.height {
+            let (top, bottom) = span(y, y + 1, height);
+            for (start, end) in self.runs(y) {
+                let (left, right) = span(start, end, width);
+                (top..bottom).for_each(|y| coarse.set_span(y, left, right));
+            }
+        }
+        coarse
+    }
+
     /// How many bits are set.
     pub fn count(&self) -> u64 {
         self.words.iter().map(|word| u64::from(word.count_ones())).sum()
@@ -70,11 +88,6 @@ impl BitGrid {
         let (whole, rest) = (self.width / 64, self.width % 64);
         row[..whole].iter().all(|word| *word == !0)
             && (rest == 0 || row[whole] == (1u64 << rest) - 1)
-    }
-
-    /// True where no bit of the row is set.
-    pub fn row_is_empty(&self, y: usize) -> bool {
-        self.row(y).iter().all(|word| *word == 0)
     }
 
     /// The runs of set bits of a row, `start..end`, from the left.
@@ -128,10 +141,22 @@ mod tests {
     }
 
     #[test]
+    fn coarser_cells_are_set_where_any_of_theirs_is() {
+        let mut grid = BitGrid::new(7, 5);
+        grid.set(6, 4);
+        grid.set_span(0, 1, 3);
+        let half = grid.coarser(2.0, 4, 3);
+        assert_eq!(half.runs(0).collect::<Vec<_>>(), [(0, 2)]);
+        assert_eq!(half.runs(1).count(), 0);
+        assert_eq!(half.runs(2).collect::<Vec<_>>(), [(3, 4)]);
+        // Texel 6..7 lies in 4..6 of cells 1.5 wide.
+        assert_eq!(grid.coarser(1.5, 5, 4).runs(2).collect::<Vec<_>>(), [(4, 5)]);
+    }
+
+    #[test]
     fn a_row_is_full_only_with_its_last_bit() {
         for width in [1, 63, 64, 65, 128, 130] {
             let mut grid = BitGrid::new(width, 1);
-            assert!(grid.row_is_empty(0));
             grid.set_span(0, 0, width - 1);
             assert!(!grid.row_is_full(0));
             grid.set(width - 1, 0);

@@ -9,7 +9,7 @@ use super::cache::{Decoded, TextureCache};
 use super::charts::{Charts, UvBox};
 use super::level::{self, LevelPicture, Region};
 use super::plan::{self, TextureUse};
-use super::raster::Rasterizer;
+use super::raster::{self, Rasterizer};
 use super::shared::SharedTextures;
 use crate::import::Picture;
 use crate::mesh::{Mesh, Model};
@@ -57,6 +57,8 @@ pub struct BlockTextures<'a> {
     /// By material of the model.
     pub(super) material_textures: Vec<Option<u32>>,
     used_texels: u64,
+    /// Square metres of the block's triangles whose textures are cut up.
+    area: f64,
 }
 
 /// One texture of a block.
@@ -130,7 +132,9 @@ impl<'a> BlockTextures<'a> {
                 let Some(Found { region, wraps, used_texels }) = found else {
                     return (texture, Prepared::Repeating(decoded), 0);
                 };
-                let picture = &decoded.picture;
+                // Where no other block waits for the picture, it becomes this one's own.
+                let picture = Arc::try_unwrap(decoded)
+                    .map_or_else(|shared| Arc::clone(&shared.picture), |own| own.picture);
                 let source = AtlasSource {
                     size: [f64::from(picture.width), f64::from(picture.height)],
                     origin: region.origin.map(|start| start as f64),
@@ -149,7 +153,40 @@ impl<'a> BlockTextures<'a> {
             textures[texture as usize] = prepared;
             used_texels += texels;
         }
-        Self { model, shared, options, steps, textures, material_textures, used_texels }
+        let mut block = Self {
+            model,
+            shared,
+            options,
+            steps,
+            textures,
+            material_textures,
+            used_texels,
+            area: 0.0,
+        };
+        block.area = block.atlas_area(mesh);
+        block
+    }
+
+    /// The area of the triangles whose textures are cut up, square metres.
+    fn atlas_area(&self, mesh: &Mesh) -> f64 {
+        if self.used_texels == 0 {
+            return 0.0;
+        }
+        let in_atlas = |triangle: &&[u32; 3]| {
+            let material = mesh.triangle_material(**triangle) as usize;
+            let texture = self.material_textures.get(material).copied().flatten();
+            texture.is_some_and(|texture| {
+                matches!(self.textures.get(texture as usize), Some(Prepared::Atlas(_)))
+            })
+        };
+        mesh.triangles.iter().filter(in_atlas).map(|triangle| mesh.triangle_area(*triangle)).sum()
+    }
+
+    /// The texels that a node of this level should have: the block's at the level's resolution,
+    /// by the node's part of the block's surface.
+    pub(super) fn share_of(&self, mesh: &Mesh, level: usize) -> f64 {
+        let texels = self.used_texels as f64 / (self.steps[level] * self.steps[level]);
+        texels * (self.atlas_area(mesh) / self.area.max(f64::MIN_POSITIVE)).min(1.0)
     }
 
     /// The number of different source texels that the block's triangles use, of textures that are
@@ -162,6 +199,8 @@ impl<'a> BlockTextures<'a> {
 /// The triangles and charts of each texture of a block.
 struct Usage {
     charts: Charts,
+    /// By chart: the sum of its triangles' areas in texture space, in tiles.
+    areas: Vec<f64>,
     /// By texture: its triangles.
     triangles: Vec<Vec<[u32; 3]>>,
 }
@@ -180,7 +219,7 @@ impl Usage {
     fn find(mesh: &Mesh, material_textures: &[Option<u32>], textures: usize) -> Self {
         let mut triangles: Vec<Vec<[u32; 3]>> = vec![Vec::new(); textures];
         if mesh.texcoords.len() != mesh.positions.len() {
-            return Self { charts: Charts::default(), triangles };
+            return Self { charts: Charts::default(), areas: Vec::new(), triangles };
         }
         for triangle in &mesh.triangles {
             let material = mesh.triangle_material(*triangle) as usize;
@@ -189,7 +228,12 @@ impl Usage {
             }
         }
         let charts = Charts::find(&mesh.texcoords, triangles.iter().flatten().copied());
-        Self { charts, triangles }
+        let mut areas = vec![0.0; charts.boxes.len()];
+        for triangle in triangles.iter().flatten() {
+            let chart = charts.of_vertex[triangle[0] as usize] as usize;
+            areas[chart] += plan::uv_area(&mesh.texcoords, *triangle);
+        }
+        Self { charts, areas, triangles }
     }
 
     /// The region of a texture, or `None` where charts are too long to be cut out of one picture.
@@ -232,13 +276,13 @@ impl Usage {
             region_size[axis] = (end - start).max(1) as usize;
         }
         let texels = (region_size[0] * region_size[1]) as u64;
-        let area: f64 = triangles.iter().map(|t| plan::uv_area(&mesh.texcoords, *t)).sum::<f64>()
+        let area = charts.iter().map(|chart| self.areas[*chart as usize]).sum::<f64>()
             * (size[0] * size[1]) as f64;
         let inner = region_size.map(|side| side.saturating_sub(2).max(1) as f64);
         let mut region = Region { origin, size: region_size, covered: None };
         let mut used_texels = texels;
         if area < NEARLY_ALL * inner[0] * inner[1] {
-            let covered = self.coverage(triangles, mesh, &region, size, wraps);
+            let covered = self.coverage(texture, &charts, mesh, &region, size, wraps);
             used_texels = covered.count();
             if used_texels < texels {
                 region.covered = Some(covered);
@@ -250,34 +294,50 @@ impl Usage {
     /// The texels of the region that bilinear sampling of some triangle reads.
     fn coverage(
         &self,
-        triangles: &[[u32; 3]],
+        texture: u32,
+        charts: &[u32],
         mesh: &Mesh,
         region: &Region,
         size: [usize; 2],
         wraps: [bool; 2],
     ) -> BitGrid {
         let mut covered = BitGrid::new(region.size[0], region.size[1]);
-        let mut rasterizer = Rasterizer::default();
         let size = size.map(|side| side as f64);
         let origin = region.origin.map(|start| start as f64);
-        for triangle in triangles {
-            let chart = self.charts.of_vertex[triangle[0] as usize];
-            let chart = &self.charts.boxes[chart as usize];
-            let first = [0, 1]
-                .map(|axis| if wraps[axis] { chart.min[axis].floor() } else { chart.tile(axis) });
-            let corners = triangle.map(|vertex| {
-                let uv = super::charts::sane(mesh.texcoords[vertex as usize]);
-                [0, 1].map(|axis| (uv[axis] - first[axis]) * size[axis] - origin[axis])
-            });
-            // Where charts cross the border, a piece of one may be asked for a tile further on.
-            let tiles = wraps.map(|wraps| if wraps { -2..3 } else { 0..1 });
-            for v in tiles[1].clone() {
-                for u in tiles[0].clone() {
-                    let moved = corners
-                        .map(|at| [at[0] + f64::from(u) * size[0], at[1] + f64::from(v) * size[1]]);
-                    rasterizer.mark(moved, &mut covered);
+        // A chart that fills its box needs no look at its triangles.
+        let filled = |chart: u32| {
+            let (bounds, area) = (&self.charts.boxes[chart as usize], self.areas[chart as usize]);
+            let sides = [0, 1].map(|axis| (bounds.max[axis] - bounds.min[axis]) * size[axis]);
+            wraps == [false; 2] && raster::fills(sides, area * size[0] * size[1])
+        };
+        for chart in charts.iter().filter(|chart| filled(**chart)) {
+            let bounds = &self.charts.boxes[*chart as usize];
+            let corner = |uv: [f64; 2]| {
+                [0, 1].map(|axis| (uv[axis] - bounds.tile(axis)) * size[axis] - origin[axis])
+            };
+            raster::mark_box(corner(bounds.min), corner(bounds.max), &mut covered);
+        }
+        // Where charts cross the border, a piece of one may be asked for a tile further on.
+        let tiles = wraps.map(|wraps| if wraps { -2..3 } else { 0..1 });
+        for (v, u) in tiles[1].clone().flat_map(|v| tiles[0].clone().map(move |u| (v, u))) {
+            let moved = [f64::from(u) * size[0], f64::from(v) * size[1]];
+            let triangles = self.triangles[texture as usize].iter().filter_map(|triangle| {
+                let chart = self.charts.of_vertex[triangle[0] as usize];
+                if filled(chart) {
+                    return None;
                 }
-            }
+                let bounds = &self.charts.boxes[chart as usize];
+                let tile = [0, 1].map(|axis| {
+                    if wraps[axis] { bounds.min[axis].floor() } else { bounds.tile(axis) }
+                });
+                Some(triangle.map(|vertex| {
+                    let uv = super::charts::sane(mesh.texcoords[vertex as usize]);
+                    [0, 1].map(|axis| {
+                        (uv[axis] - tile[axis]) * size[axis] - origin[axis] + moved[axis]
+                    })
+                }))
+            });
+            Rasterizer::default().mark_all(triangles, &mut covered);
         }
         covered
     }

@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use super::bits::BitGrid;
-use super::fill;
+use super::fill::{self, Texels};
 use super::scale::{self, LinearImage, Rows, Weights};
 use super::srgb;
 use crate::import::Picture;
 
-/// How far, in texels, the source's own texels are extended into unused ones: as far as a node's
-/// atlas copies texels around a chart (half a cell of reach and the rest of the last cell).
-const SOURCE_DILATION: usize = 12;
+/// How far, in texels, used texels are extended into unused ones at every level: no block of a
+/// JPEG (16 a side, with half the colour resolution) that holds a used texel holds a foreign one,
+/// and atlases copy less around a chart (half a cell of reach and the rest of the last cell).
+const REACH: usize = 16;
 
 /// Which texels of a texture a block uses.
 #[derive(Debug)]
@@ -24,7 +25,7 @@ pub(crate) struct Region {
 }
 
 /// A region at one level's resolution.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct LevelPicture {
     /// Columns and rows.
     pub size: [usize; 2],
@@ -35,7 +36,7 @@ pub(crate) struct LevelPicture {
     pixels: Pixels,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 enum Pixels {
     /// The source's own, from this column and row on.
     Source(Arc<Picture>, [usize; 2]),
@@ -54,20 +55,60 @@ impl LevelPicture {
         &pixels[(y * width + x) * self.channels..][..count * self.channels]
     }
 
-    /// The same at half the resolution, for atlases that are larger than allowed.
+    /// The same at half the resolution.
     pub fn halved(&self) -> Self {
-        let mut rows = PictureRows::new(self);
-        let image = scale::area(&mut rows, [2.0; 2]);
-        Self {
-            size: [image.width, image.height],
-            channels: self.channels,
-            step: self.step * 2.0,
-            pixels: Pixels::Own(bytes(&image, self.channels)),
+        self.reduced(2.0)
+    }
+
+    /// The same with `ratio` times fewer texels along each axis; at least 1.
+    fn reduced(&self, ratio: f64) -> Self {
+        let (size, pixels) = if self.channels == 3 && (ratio - 2.0).abs() < 1e-9 {
+            (self.size.map(|side| side.div_ceil(2)), self.halved_rgb())
+        } else {
+            let image = scale::area(&mut PictureRows { picture: self }, [ratio; 2]);
+            ([image.width, image.height], bytes(&image, self.channels))
+        };
+        Self { size, channels: self.channels, step: self.step * ratio, pixels: Pixels::Own(pixels) }
+    }
+
+    /// Means of two by two texels in linear light; where a side is odd, of what there is.
+    fn halved_rgb(&self) -> Vec<u8> {
+        let (linear, byte) = (srgb::to_linear(), srgb::to_byte());
+        let light = |value: u8| u32::from(linear[usize::from(value)]);
+        let [width, height] = self.size;
+        let mut pixels = Vec::with_capacity(width.div_ceil(2) * height.div_ceil(2) * 3);
+        for y in (0..height).step_by(2) {
+            let (upper, last) = self.row(y, 0, width).as_chunks::<6>();
+            let (lower, last_lower) = self.row((y + 1).min(height - 1), 0, width).as_chunks::<6>();
+            pixels.extend(upper.iter().zip(lower).flat_map(|(upper, lower)| {
+                [0, 1, 2].map(|channel| {
+                    let sum = light(upper[channel])
+                        + light(upper[channel + 3])
+                        + light(lower[channel])
+                        + light(lower[channel + 3]);
+                    byte.of(((sum + 2) >> 2) as u16)
+                })
+            }));
+            let pairs = last.iter().zip(last_lower);
+            pixels.extend(
+                pairs.map(|(upper, lower)| {
+                    byte.of(((light(*upper) + light(*lower) + 1) >> 1) as u16)
+                }),
+            );
+        }
+        pixels
+    }
+
+    /// Extends the used texels of a picture that is its own.
+    fn extend(&mut self, used: &BitGrid) {
+        if let Pixels::Own(pixels) = &mut self.pixels {
+            let (channels, stride) = (self.channels, self.size[0]);
+            fill::extend(&mut Texels { pixels, channels, stride, origin: [0; 2] }, used, REACH);
         }
     }
 }
 
-/// The bytes of a scaled picture, texels that nothing uses filled in.
+/// The bytes of a scaled picture. Where nothing was opaque, colours come from around.
 fn bytes(image: &LinearImage, channels: usize) -> Vec<u8> {
     let mut pixels = if channels == 4 { image.to_rgba8() } else { image.to_rgb8() };
     if !image.weight.is_empty() {
@@ -87,93 +128,89 @@ fn bytes(image: &LinearImage, channels: usize) -> Vec<u8> {
 /// Makes the pictures of all levels; `steps` are source texels per texel along each axis, the
 /// finest (1) last.
 ///
-/// The finest is the source itself. The next is scaled from it; each coarser one from the one
-/// before, by exact two-by-two means where the ratio is 2.
+/// The finest is the source itself, each other one is scaled from the next finer. Unused texels
+/// near used ones take these's colours first, so that no mean mixes in a foreign one.
 pub(crate) fn level_pictures(
-    picture: &Arc<Picture>,
+    picture: Arc<Picture>,
     region: &Region,
     steps: &[f64],
 ) -> Vec<LevelPicture> {
     let source = source_level(picture, region);
-    let mut levels = Vec::with_capacity(steps.len());
-    let mut finer: Option<(LinearImage, f64)> = None;
-    for step in steps.iter().rev() {
-        if *step <= 1.0 {
-            levels.push(None);
-            continue;
+    let mut used = region.covered.clone();
+    let mut coarser = |finer: &LevelPicture, step: f64| {
+        let ratio = step / finer.step;
+        // Exact, whatever the products round to.
+        let mut level = LevelPicture { step, ..finer.reduced(ratio) };
+        if let Some(used) = &mut used {
+            *used = used.coarser(ratio, level.size[0], level.size[1]);
+            level.extend(used);
         }
-        let image = match &finer {
-            None => {
-                let mut rows = PictureRows::new(&source);
-                // Alpha is the weight already: what is transparent has no colour to give.
-                rows.covered = region.covered.as_ref().filter(|_| source.channels == 3);
-                scale::area(&mut rows, [*step; 2])
-            }
-            Some((image, previous)) if (step / previous - 2.0).abs() < 1e-9 => image.halve(),
-            Some((image, previous)) => scale::area(&mut &*image, [step / previous; 2]),
-        };
-        levels.push(Some(LevelPicture {
-            size: [image.width, image.height],
-            channels: source.channels,
-            step: *step,
-            pixels: Pixels::Own(bytes(&image, source.channels)),
-        }));
-        finer = Some((image, *step));
+        level
+    };
+    let mut levels: Vec<LevelPicture> = Vec::with_capacity(steps.len());
+    let mut steps = steps.iter().rev();
+    match steps.next() {
+        Some(finest) if *finest > source.step => levels.push(coarser(&source, *finest)),
+        Some(_) => levels.push(source),
+        None => return levels,
+    }
+    for step in steps {
+        let finer = &levels[levels.len() - 1];
+        let level = if *step > finer.step { coarser(finer, *step) } else { finer.clone() };
+        levels.push(level);
     }
     levels.reverse();
-    // Levels at full resolution are the source; more than one only where a caller repeats it.
-    let mut source = Some(source);
     levels
-        .into_iter()
-        .map(|level| {
-            level.unwrap_or_else(|| source.take().unwrap_or_else(|| source_level(picture, region)))
-        })
-        .collect()
 }
 
 /// The region at full resolution: the source's texels as they are, unused ones near used ones
-/// replaced by their neighbours' colours.
-fn source_level(picture: &Arc<Picture>, region: &Region) -> LevelPicture {
+/// replaced by their neighbours' colours. Nothing is copied where nobody else has the picture.
+fn source_level(mut picture: Arc<Picture>, region: &Region) -> LevelPicture {
     let channels = usize::from(picture.channels);
     let [width, height] = region.size;
     let source = [picture.width as usize, picture.height as usize];
     let inside = (0..2).all(|axis| {
         region.origin[axis] >= 0 && region.origin[axis] as usize + region.size[axis] <= source[axis]
     });
-    let pixels = if inside && region.covered.is_none() {
-        Pixels::Source(Arc::clone(picture), region.origin.map(|start| start as usize))
-    } else {
-        let mut pixels = Vec::with_capacity(width * height * channels);
-        for y in 0..height {
-            let row = (region.origin[1] + y as i64).rem_euclid(source[1] as i64) as usize;
-            let row = &picture.pixels[row * source[0] * channels..][..source[0] * channels];
-            let mut x = region.origin[0].rem_euclid(source[0] as i64) as usize;
-            let mut left = width;
-            while left > 0 {
-                let count = left.min(source[0] - x);
-                pixels.extend_from_slice(&row[x * channels..(x + count) * channels]);
-                left -= count;
-                x = 0;
-            }
+    let origin = region.origin.map(|start| start.max(0) as usize);
+    let level = |pixels| LevelPicture { size: region.size, channels, step: 1.0, pixels };
+    if inside {
+        let Some(covered) = &region.covered else {
+            return level(Pixels::Source(picture, origin));
+        };
+        if let Some(own) = Arc::get_mut(&mut picture) {
+            let pixels = &mut own.pixels[..];
+            fill::extend(
+                &mut Texels { pixels, channels, stride: source[0], origin },
+                covered,
+                REACH,
+            );
+            return level(Pixels::Source(picture, origin));
         }
-        if let Some(covered) = &region.covered {
-            fill::dilate(&mut pixels, channels, &mut covered.clone(), SOURCE_DILATION);
+    }
+    let mut pixels = Vec::with_capacity(width * height * channels);
+    for y in 0..height {
+        let row = (region.origin[1] + y as i64).rem_euclid(source[1] as i64) as usize;
+        let row = &picture.pixels[row * source[0] * channels..][..source[0] * channels];
+        let mut x = region.origin[0].rem_euclid(source[0] as i64) as usize;
+        let mut left = width;
+        while left > 0 {
+            let count = left.min(source[0] - x);
+            pixels.extend_from_slice(&row[x * channels..(x + count) * channels]);
+            left -= count;
+            x = 0;
         }
-        Pixels::Own(pixels)
-    };
-    LevelPicture { size: region.size, channels, step: 1.0, pixels }
+    }
+    let mut level = level(Pixels::Own(pixels));
+    if let Some(covered) = &region.covered {
+        level.extend(covered);
+    }
+    level
 }
 
 /// Rows of a level picture for the scaler.
 struct PictureRows<'a> {
     picture: &'a LevelPicture,
-    covered: Option<&'a BitGrid>,
-}
-
-impl<'a> PictureRows<'a> {
-    fn new(picture: &'a LevelPicture) -> Self {
-        Self { picture, covered: None }
-    }
 }
 
 impl Rows for PictureRows<'_> {
@@ -182,46 +219,27 @@ impl Rows for PictureRows<'_> {
     }
 
     fn weighted(&self) -> bool {
-        self.picture.channels == 4 || self.covered.is_some()
+        self.picture.channels == 4
     }
 
     fn read(&mut self, y: usize, rgb: &mut [u16], weight: &mut [u16]) -> Weights {
         let table = srgb::to_linear();
-        let width = self.picture.size[0];
-        if self.picture.channels == 4 {
-            let row = self.picture.row(y, 0, width).as_chunks::<4>().0;
-            let texels = rgb.as_chunks_mut::<3>().0.iter_mut().zip(weight);
-            for (source, (texel, weight)) in row.iter().zip(texels) {
-                let alpha = u32::from(source[3]);
-                *weight = (alpha * 257) as u16;
-                for channel in 0..3 {
-                    let linear = u32::from(table[usize::from(source[channel])]);
-                    texel[channel] = ((linear * alpha + 127) / 255) as u16;
-                }
-            }
-            return Weights::Mixed;
-        }
-        let linear = |rgb: &mut [u16], row: &[u8]| {
+        let row = self.picture.row(y, 0, self.picture.size[0]);
+        if self.picture.channels == 3 {
             for (value, byte) in rgb.iter_mut().zip(row) {
                 *value = table[usize::from(*byte)];
             }
-        };
-        let Some(covered) = self.covered else {
-            linear(rgb, self.picture.row(y, 0, width));
-            return Weights::Full;
-        };
-        if covered.row_is_empty(y) {
-            return Weights::None;
-        }
-        if covered.row_is_full(y) {
-            linear(rgb, self.picture.row(y, 0, width));
             return Weights::Full;
         }
-        rgb.fill(0);
-        weight.fill(0);
-        for (start, end) in covered.runs(y) {
-            linear(&mut rgb[start * 3..end * 3], self.picture.row(y, start, end - start));
-            weight[start..end].fill(u16::MAX);
+        // Alpha is the weight: what is transparent has no colour to give.
+        let texels = rgb.as_chunks_mut::<3>().0.iter_mut().zip(weight);
+        for (source, (texel, weight)) in row.as_chunks::<4>().0.iter().zip(texels) {
+            let alpha = u32::from(source[3]);
+            *weight = (alpha * 257) as u16;
+            for channel in 0..3 {
+                let linear = u32::from(table[usize::from(source[channel])]);
+                texel[channel] = ((linear * alpha + 127) / 255) as u16;
+            }
         }
         Weights::Mixed
     }
@@ -238,7 +256,7 @@ pub(crate) fn resize_whole(picture: &Arc<Picture>, size: [usize; 2]) -> Picture 
         pixels: Pixels::Source(Arc::clone(picture), [0, 0]),
     };
     let step = [0, 1].map(|axis| whole[axis] as f64 / size[axis] as f64);
-    let image = scale::area(&mut PictureRows::new(&view), step);
+    let image = scale::area(&mut PictureRows { picture: &view }, step);
     Picture {
         width: image.width as u32,
         height: image.height as u32,
@@ -261,7 +279,7 @@ mod tests {
     fn the_finest_level_is_the_source_itself() {
         let source = picture(16, 9, 3);
         let region = Region { origin: [3, 2], size: [10, 5], covered: None };
-        let levels = level_pictures(&source, &region, &[2.6, 1.3, 1.0]);
+        let levels = level_pictures(Arc::clone(&source), &region, &[2.6, 1.3, 1.0]);
         assert_eq!(levels[2].row(4, 1, 3), &source.pixels[(6 * 16 + 4) * 3..][..9]);
         assert_eq!(levels[1].size, [8, 4]);
         assert_eq!(levels[0].size, [4, 2]);
@@ -271,7 +289,7 @@ mod tests {
     fn a_region_over_the_border_wraps() {
         let source = picture(16, 9, 3);
         let region = Region { origin: [-2, 7], size: [20, 4], covered: None };
-        let level = &level_pictures(&source, &region, &[1.0])[0];
+        let level = &level_pictures(Arc::clone(&source), &region, &[1.0])[0];
         assert_eq!(level.row(0, 0, 1), &source.pixels[(7 * 16 + 14) * 3..][..3]);
         assert_eq!(level.row(2, 18, 1), &source.pixels[..3]);
     }
@@ -290,13 +308,51 @@ mod tests {
             }
         }
         let region = Region { origin: [0; 2], size: [64; 2], covered: Some(covered) };
-        for level in &level_pictures(&Arc::new(source), &region, &[12.0, 6.0, 3.0, 1.5]) {
-            for y in 0..level.size[1] {
-                for texel in level.row(y, 0, level.size[0]).chunks(3) {
-                    assert!(texel[0].abs_diff(180) <= 1 && texel[1].abs_diff(90) <= 1);
+        for steps in [[12.0, 6.0, 3.0, 1.5, 1.0], [16.0, 8.0, 4.0, 2.0, 1.0]] {
+            for level in &level_pictures(Arc::new(source.clone()), &region, &steps) {
+                for y in 0..level.size[1] {
+                    for (x, texel) in level.row(y, 0, level.size[0]).chunks(3).enumerate() {
+                        // Sixteen texels along one axis are as many or more on the diagonal.
+                        let distance = (x as f64).hypot(y as f64) - 50.0 / level.step;
+                        if distance < 16.0 {
+                            assert!(texel[0].abs_diff(180) <= 1 && texel[1].abs_diff(90) <= 1);
+                        }
+                    }
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_picture_that_others_have_too_stays_as_it_is() {
+        let shared = picture(16, 9, 3);
+        let mut covered = BitGrid::new(16, 9);
+        covered.set(8, 4);
+        let region = Region { origin: [0; 2], size: [16, 9], covered: Some(covered) };
+        let before = shared.pixels.clone();
+        let of_shared = level_pictures(Arc::clone(&shared), &region, &[2.0, 1.0]);
+        assert_eq!(shared.pixels, before);
+        let of_own = level_pictures(shared, &region, &[2.0, 1.0]);
+        for (a, b) in of_shared.iter().zip(&of_own) {
+            assert!((0..a.size[1]).all(|y| a.row(y, 0, a.size[0]) == b.row(y, 0, b.size[0])));
+            assert_eq!(a.row(0, 0, 1), a.row(a.size[1] - 1, a.size[0] - 1, 1));
+        }
+    }
+
+    #[test]
+    fn halves_are_means_in_linear_light_and_odd_sides_average_what_there_is() {
+        let checker = (0..48).flat_map(|i| [if (i % 8 + i / 8) % 2 == 0 { 255 } else { 0 }; 3]);
+        let [width, height] = [8, 6];
+        let source = Picture { width, height, channels: 3, pixels: checker.collect() };
+        let region = Region { origin: [0; 2], size: [8, 6], covered: None };
+        let level = &level_pictures(Arc::new(source), &region, &[2.0])[0];
+        assert!((0..3).all(|y| level.row(y, 0, 4).iter().all(|byte| *byte == 188)));
+
+        let pixels = [[0; 3], [255; 3], [9; 3]].concat();
+        let odd = Picture { width: 3, height: 1, channels: 3, pixels };
+        let region = Region { origin: [0; 2], size: [3, 1], covered: None };
+        let level = &level_pictures(Arc::new(odd), &region, &[2.0, 1.0])[0];
+        assert_eq!((level.size, level.row(0, 0, 2)), ([2, 1], &[188, 188, 188, 9, 9, 9][..]));
     }
 
     #[test]
@@ -304,7 +360,7 @@ mod tests {
         let pixels = [[200, 100, 50, 255], [0, 0, 0, 0]].concat().repeat(32);
         let source = Arc::new(Picture { width: 8, height: 8, channels: 4, pixels });
         let region = Region { origin: [0; 2], size: [8; 2], covered: None };
-        let level = &level_pictures(&source, &region, &[2.0])[0];
+        let level = &level_pictures(source, &region, &[2.0])[0];
         assert!(level.row(1, 0, 4).chunks(4).all(|texel| texel[0].abs_diff(200) <= 1
             && texel[2].abs_diff(50) <= 1
             && texel[3].abs_diff(128) <= 1));

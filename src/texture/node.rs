@@ -1,6 +1,7 @@
 //! From a node's working mesh to what its file holds: primitives by surface, atlases, and
 //! texture coordinates that follow the texels.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
@@ -20,6 +21,14 @@ const CELL: usize = 2;
 
 /// Texels per cell of a root's atlas: nothing coarser replaces it.
 const ROOT_CELL: usize = 8;
+
+/// A coarse node with more than this many times its share of the block's texels takes them from a
+/// level above. Simplification that joins charts leaves triangles that span what the source does
+/// not use.
+const MAX_SHARE: f64 = 4.0;
+
+/// Atlases with fewer texels than this are left as they are.
+const SMALL: usize = 64 * 64;
 
 /// A node ready to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -227,13 +236,14 @@ impl<'a> NodeBuilder<'a> {
         }
         let is_leaf = self.block.steps[self.level] <= 1.0;
         let max_side = (self.block.options.max_atlas as usize).clamp(16, encode::MAX_SIDE) / 4 * 4;
-        let mut coarser: Vec<LevelPicture> = Vec::new();
+        let mut coarser: Vec<Cow<'a, LevelPicture>> = Vec::new();
         let mut halvings = 0;
+        let mut fitted = false;
         loop {
-            let levels: Vec<&LevelPicture> = if halvings == 0 {
+            let levels: Vec<&LevelPicture> = if halvings == 0 && !fitted {
                 pictures.keys().filter_map(|texture| self.level_picture(*texture)).collect()
             } else {
-                coarser.iter().collect()
+                coarser.iter().map(|picture| &**picture).collect()
             };
             let mappings = self.texel_mappings(&pictures, &levels);
             let (sheet_pictures, members) = self.sheet_pictures(&pictures, &levels, &mappings);
@@ -244,13 +254,19 @@ impl<'a> NodeBuilder<'a> {
             };
             let max_pages = if is_leaf && halvings == 0 { usize::MAX } else { 1 };
             if let Some(atlas) = sheet.build(max_pages) {
+                if !is_leaf && !fitted && halvings == 0 && self.exceeds_share(&atlas) {
+                    fitted = true;
+                    coarser =
+                        pictures.keys().filter_map(|texture| self.coarser(*texture)).collect();
+                    continue;
+                }
                 self.take_atlas(&atlas, &mappings, &members, channels)?;
                 break;
             }
             if levels.iter().all(|picture| picture.size == [1, 1]) {
                 return Err(Error::Internal(format!("no atlas of {max_side} texels a side")));
             }
-            coarser = levels.iter().map(|picture| picture.halved()).collect();
+            coarser = levels.iter().map(|picture| Cow::Owned(picture.halved())).collect();
             halvings += 1;
         }
         if halvings > 0 {
@@ -265,6 +281,21 @@ impl<'a> NodeBuilder<'a> {
             );
         }
         Ok(())
+    }
+
+    /// True where an atlas has far more texels than the node's part of the block's surface.
+    fn exceeds_share(&self, atlas: &Atlas) -> bool {
+        let texels: usize = atlas.pages.iter().map(|page| page.size[0] * page.size[1]).sum();
+        texels > SMALL && texels as f64 > MAX_SHARE * self.block.share_of(self.mesh, self.level)
+    }
+
+    /// A texture at the level above, or at half the resolution where there is none.
+    fn coarser(&self, texture: u32) -> Option<Cow<'a, LevelPicture>> {
+        let Prepared::Atlas(source) = &self.block.textures[texture as usize] else { return None };
+        match self.level.checked_sub(1) {
+            Some(above) => source.levels.get(above).map(Cow::Borrowed),
+            None => source.levels.first().map(|root| Cow::Owned(root.halved())),
+        }
     }
 
     fn level_picture(&self, texture: u32) -> Option<&'a LevelPicture> {

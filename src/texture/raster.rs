@@ -32,6 +32,26 @@ impl Rasterizer {
         }
     }
 
+    /// The same for many triangles; pairs that halve an upright rectangle, as the grids of scans
+    /// and façades have them, are marked at once.
+    pub fn mark_all(&mut self, triangles: impl Iterator<Item = [[f64; 2]; 3]>, grid: &mut BitGrid) {
+        let mut held: Option<[[f64; 2]; 3]> = None;
+        for triangle in triangles {
+            if let Some(before) = held {
+                if let Some((min, max)) = rectangle(&before, &triangle) {
+                    mark_box(min, max, grid);
+                    held = None;
+                    continue;
+                }
+                self.mark(before, grid);
+            }
+            held = Some(triangle);
+        }
+        if let Some(last) = held {
+            self.mark(last, grid);
+        }
+    }
+
     /// Widens the span of each row by the part of an edge that lies in the row's reach.
     fn edge(&mut self, p: [f64; 2], q: [f64; 2], first: usize, height: usize) {
         let (p, q) = if p[1] <= q[1] { (p, q) } else { (q, p) };
@@ -49,6 +69,45 @@ impl Rasterizer {
             span[1] = span[1].max(x0).max(x1);
         }
     }
+}
+
+/// Triangles that leave less than this of their box free, as a band along its sides in cells, are
+/// taken to fill it: what a tiling of a rectangle leaves by rounding.
+const FREE_BAND: f64 = 0.01;
+
+/// True where triangles with this sum of areas fill a box with these sides, provided that they do
+/// not lie on each other; in cells.
+pub(crate) fn fills(sides: [f64; 2], area: f64) -> bool {
+    sides[0] * sides[1] - area <= FREE_BAND * (sides[0] + sides[1])
+}
+
+/// The box of two triangles that are its halves.
+fn rectangle(a: &[[f64; 2]; 3], b: &[[f64; 2]; 3]) -> Option<([f64; 2], [f64; 2])> {
+    let mut min = a[0];
+    let mut max = a[0];
+    for corner in &a[1..] {
+        for axis in 0..2 {
+            min[axis] = min[axis].min(corner[axis]);
+            max[axis] = max[axis].max(corner[axis]);
+        }
+    }
+    // Bit by bit, which of the box's corners a triangle has.
+    let corners = |triangle: &[[f64; 2]; 3]| {
+        triangle.iter().try_fold(0u8, |found, at| {
+            let on_corner = (0..2).all(|axis| at[axis] == min[axis] || at[axis] == max[axis]);
+            let corner = u8::from(at[0] == max[0]) + 2 * u8::from(at[1] == max[1]);
+            on_corner.then_some(found | 1 << corner)
+        })
+    };
+    let (a, b) = (corners(a)?, corners(b)?);
+    (a.count_ones() == 3 && b.count_ones() == 3 && a | b == 0b1111).then_some((min, max))
+}
+
+/// Sets every cell of `grid` that bilinear sampling inside a box reads.
+pub(crate) fn mark_box(min: [f64; 2], max: [f64; 2], grid: &mut BitGrid) {
+    let (left, right) = touched(min[0], max[0], grid.width());
+    let (top, bottom) = touched(min[1], max[1], grid.height());
+    (top..bottom).for_each(|y| grid.set_span(y, left, right));
 }
 
 /// The cells `start..end` of `0..count` that the interval, grown by the reach, overlaps.
@@ -90,6 +149,24 @@ mod tests {
     fn what_lies_outside_the_grid_is_left_out() {
         assert_eq!(cells([[-9.0, -9.0]; 3], 8), []);
         assert_eq!(cells([[-9.0, 3.5], [20.0, 3.5], [20.0, 3.5]], 4).len(), 4);
+    }
+
+    #[test]
+    fn a_box_is_marked_as_its_two_triangles_are() {
+        let [min, max] = [[1.2, 3.5], [9.0, 7.7]];
+        let halves = [[min, [max[0], min[1]], max], [min, max, [min[0], max[1]]]];
+        let (mut by_box, mut by_halves) = (BitGrid::new(16, 16), BitGrid::new(16, 16));
+        mark_box(min, max, &mut by_box);
+        halves.map(|half| Rasterizer::default().mark(half, &mut by_halves));
+        assert_eq!(by_box, by_halves);
+        let mut by_all = BitGrid::new(16, 16);
+        Rasterizer::default().mark_all(halves.into_iter(), &mut by_all);
+        assert_eq!(by_box, by_all);
+        assert_eq!(rectangle(&halves[0], &halves[1]), Some((min, max)));
+        // Neither one half twice nor halves over the same diagonal's other side of a larger box.
+        assert_eq!(rectangle(&halves[0], &halves[0]), None);
+        assert_eq!(rectangle(&halves[0], &[min, max, [0.0, 9.0]]), None);
+        assert!(fills([7.8, 4.2], 7.8 * 4.2 - 0.01) && !fills([7.8, 4.2], 7.8 * 2.1));
     }
 
     #[test]

@@ -272,63 +272,10 @@ impl Columns {
 }
 
 impl LinearImage {
-    /// Each texel of the result is the mean of two by two; where a side is odd, of what there is.
-    pub fn halve(&self) -> Self {
-        let [width, height] = [self.width.div_ceil(2), self.height.div_ceil(2)];
-        let mut rgb = Vec::with_capacity(width * height * 3);
-        let mut weight =
-            Vec::with_capacity(if self.weight.is_empty() { 0 } else { width * height });
-        let mut sums = vec![0u32; self.width * 3 + 3];
-        for y in 0..height {
-            let rows = [2 * y, (2 * y + 1).min(self.height - 1)];
-            if self.weight.is_empty() {
-                let [upper, lower] =
-                    rows.map(|y| &self.rgb[y * self.width * 3..][..self.width * 3]);
-                for ((sum, upper), lower) in sums.iter_mut().zip(upper).zip(lower) {
-                    *sum = u32::from(*upper) + u32::from(*lower);
-                }
-                // An odd row ends with its last texel twice.
-                let last = (self.width - 1) * 3;
-                sums.copy_within(last..last + 3, last + 3);
-                for pair in sums.as_chunks::<6>().0.iter().take(width) {
-                    let [a, b, c, d, e, f] = pair;
-                    rgb.extend([a + d, b + e, c + f].map(|sum| ((sum + 2) >> 2) as u16));
-                }
-            } else {
-                for x in 0..width {
-                    let columns = [2 * x, (2 * x + 1).min(self.width - 1)];
-                    let (texel, sum) = self.weighted_mean(rows, columns);
-                    rgb.extend(texel);
-                    weight.push(sum);
-                }
-            }
-        }
-        Self { width, height, rgb, weight }
-    }
-
-    fn weighted_mean(&self, rows: [usize; 2], columns: [usize; 2]) -> ([u16; 3], u16) {
-        let mut sums = [0u64; 3];
-        let mut weights = 0u64;
-        for y in rows {
-            for x in columns {
-                let index = y * self.width + x;
-                let weight = u64::from(self.weight[index]);
-                weights += weight;
-                for (channel, sum) in sums.iter_mut().enumerate() {
-                    *sum += u64::from(self.rgb[index * 3 + channel]) * weight;
-                }
-            }
-        }
-        if weights == 0 {
-            return ([0; 3], 0);
-        }
-        (sums.map(|sum| ((sum + weights / 2) / weights) as u16), ((weights + 2) / 4) as u16)
-    }
-
     /// Back to sRGB bytes, three a texel.
     pub fn to_rgb8(&self) -> Vec<u8> {
         let table = srgb::to_byte();
-        self.rgb.iter().map(|value| table[usize::from(*value)]).collect()
+        self.rgb.iter().map(|value| table.of(*value)).collect()
     }
 
     /// Back to sRGB bytes with the weight as alpha, four a texel.
@@ -337,13 +284,14 @@ impl LinearImage {
         let mut pixels = Vec::with_capacity(self.width * self.height * 4);
         for (index, texel) in self.rgb.as_chunks::<3>().0.iter().enumerate() {
             let alpha = self.weight.get(index).copied().unwrap_or(FULL);
-            pixels.extend(texel.map(|value| table[usize::from(value)]));
+            pixels.extend(texel.map(|value| table.of(value)));
             pixels.push(((u32::from(alpha) + 128) / 257) as u8);
         }
         pixels
     }
 }
 
+#[cfg(test)]
 impl Rows for &LinearImage {
     fn size(&self) -> [usize; 2] {
         [self.width, self.height]
@@ -384,7 +332,6 @@ mod tests {
     #[test]
     fn a_checker_averages_in_linear_light() {
         let checker = image(16, 16, |x, y| if (x + y) % 2 == 0 { FULL } else { 0 });
-        assert!(checker.halve().to_rgb8().iter().all(|byte| *byte == 188));
         let scaled = area(&mut &checker, [2.0, 2.0]);
         assert_eq!((scaled.width, scaled.height), (8, 8));
         assert!(scaled.to_rgb8().iter().all(|byte| *byte == 188));
@@ -423,15 +370,7 @@ mod tests {
                 assert!(*weight == 0 || (texel[0] as i32 - 40000).abs() < 300, "{texel:?}");
             }
             assert!(chain.weight.iter().any(|weight| *weight > 0));
-            chain = chain.halve();
+            chain = area(&mut &chain, [2.0, 2.0]);
         }
-    }
-
-    #[test]
-    fn odd_sides_average_what_there_is() {
-        let odd = image(3, 1, |x, _| [100, 200, 400][x]);
-        let halved = odd.halve();
-        assert_eq!((halved.width, halved.height), (2, 1));
-        assert_eq!(halved.rgb, [150, 150, 150, 400, 400, 400]);
     }
 }

@@ -100,7 +100,7 @@ fn whole(picture: Picture) -> LevelPicture {
         size: [picture.width as usize, picture.height as usize],
         covered: None,
     };
-    level_pictures(&std::sync::Arc::new(picture), &region, &[1.0]).remove(0)
+    level_pictures(std::sync::Arc::new(picture), &region, &[1.0]).remove(0)
 }
 
 fn inside([a, b, c]: [[f64; 2]; 3], random: &mut Random) -> [f64; 2] {
