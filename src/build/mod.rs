@@ -17,6 +17,7 @@ pub mod hierarchy;
 pub mod inputs;
 pub mod lattice;
 pub mod memory;
+pub mod mend_materials;
 pub mod merge;
 pub mod options;
 pub mod pipeline;

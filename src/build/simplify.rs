@@ -3,9 +3,11 @@
 //! 1. Quadric edge collapse with attributes (Garland & Heckbert as meshoptimizer has it, with
 //!    vertex positions and attributes solved for afterwards), inside texture seams.
 //! 2. The same, allowed to collapse across texture seams but not across material borders.
-//! 3. The same, also leaving out the smallest separate parts; or vertex clustering
-//!    ([`super::cluster`]), which has no topology to respect: whichever is measured to stay nearer
-//!    to the input.
+//! 3. Whichever of these is measured to stay nearest to the input on average:
+//!    - the same, across material borders too; triangles then get one material each again
+//!      ([`super::mend_materials`]);
+//!    - the same, also leaving out the smallest separate parts;
+//!    - vertex clustering ([`super::cluster`]), which has no topology to respect.
 //!
 //! Border vertices that the level keeps are locked throughout.
 
@@ -18,6 +20,7 @@ use super::border::{Border, Fate, Path};
 use super::cluster::cluster;
 use super::compact::compact;
 use super::distance::mean_distance;
+use super::mend_materials::mend_materials;
 use crate::mesh::{Mesh, PositionKey, key};
 
 /// Which method makes the coarse levels.
@@ -43,7 +46,9 @@ pub enum LadderStep {
     Collapse,
     /// Edge collapse across texture seams.
     Permissive,
-    /// Edge collapse across texture seams, with the smallest separate parts left out.
+    /// Edge collapse across texture seams and material borders.
+    Across,
+    /// Edge collapse across texture seams and material borders, with the smallest separate parts left out.
     Prune,
     /// Vertex clustering.
     Clustering,
@@ -58,6 +63,7 @@ impl LadderStep {
             Self::Original => "original geometry",
             Self::Collapse => "edge collapse within texture seams",
             Self::Permissive => "edge collapse across texture seams",
+            Self::Across => "edge collapse across material borders",
             Self::Prune => "edge collapse without the smallest separate parts",
             Self::Clustering => "vertex clustering",
             Self::Remnant => "the largest triangles alone",
@@ -132,9 +138,12 @@ pub fn simplify(
             return best;
         }
     }
-    let pruned =
-        collapse(&source.mesh, &source.border, &locked, target, LadderStep::Prune, weights);
-    let clustered = clustered(&source.mesh, &source.border, &locked, target);
+    let collapsed = |step| collapse(&source.mesh, &source.border, &locked, target, step, weights);
+    let candidates = [
+        collapsed(LadderStep::Across),
+        collapsed(LadderStep::Prune),
+        clustered(&source.mesh, &source.border, &locked, target),
+    ];
     // Within the budget and nearest to the input; else the fewest triangles.
     let rank = |candidate: &Simplified| {
         let triangles = candidate.mesh.triangles.len();
@@ -145,7 +154,7 @@ pub fn simplify(
         }
     };
     let mut best = (rank(&best), best);
-    for candidate in [pruned, clustered] {
+    for candidate in candidates {
         let rank = rank(&candidate);
         if !candidate.mesh.triangles.is_empty() && rank.partial_cmp(&best.0) == Some(Ordering::Less)
         {
@@ -180,6 +189,8 @@ fn collapse(
     let mut options = SimplifyOptions::ErrorAbsolute;
     if step != LadderStep::Collapse {
         options |= SimplifyOptions::Permissive;
+    }
+    if step == LadderStep::Permissive {
         protect_material_borders(mesh, &mut locks);
     }
     if step == LadderStep::Prune {
@@ -208,7 +219,9 @@ fn collapse(
         triangles: indices.as_chunks::<3>().0.to_vec(),
     };
     write_attributes(&mut result, &attributes, attribute_weights.len());
-    let (mesh, border) = compact(&result, border);
+    let mut border = border.clone();
+    mend_materials(&mut result, &mut border, mesh);
+    let (mesh, border) = compact(&result, &border);
     Simplified { mesh, border, error: f64::from(error), step }
 }
 
