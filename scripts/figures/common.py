@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-DATA = ROOT.parent / "shared" / "data"
+DATA = Path(os.environ.get("HLOD_DATA", ROOT.parent / "shared" / "data"))
 
 
 class Programs:
