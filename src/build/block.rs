@@ -12,6 +12,7 @@ use super::lattice::Lattice;
 use super::options::BuildOptions;
 use super::pipeline::in_parallel;
 use super::progress::Progress;
+use super::shared_borders::{keep_shared, shared_positions};
 use super::stages::{Stage, Stages};
 use super::stray::set_strays_aside;
 use crate::Result;
@@ -99,6 +100,10 @@ pub fn build_input(
     let texture_plan = TexturePlan::new(&model);
     let drafts = stages.time(Stage::Gather, || drafts(&mut model, plans, options));
     let common = lattice_of(drafts.iter().filter(|draft| !draft.far));
+    let shared_vertices = stages.time(Stage::Gather, || {
+        let bounds: Vec<_> = drafts.iter().map(|draft| draft.source.bounds()).collect();
+        shared_positions(&bounds, |block| drafts[block].source.positions())
+    });
     let cache = TextureCache::new(
         &model,
         &texture_plan,
@@ -111,10 +116,11 @@ pub fn build_input(
         let (low, high) = source.bounds();
         let origin = lattice.origin_near(std::array::from_fn(|i| (low[i] + high[i]) * 0.5));
         let (piece, collapsed) = stages.time(Stage::Gather, || {
-            let piece = match source {
+            let mut piece = match source {
                 DraftSource::Parts(parts) => gather(&model.materials, &parts),
                 DraftSource::Piece(piece) => *piece,
             };
+            keep_shared(&mut piece, &shared_vertices);
             localise(piece, origin, lattice)
         });
         let mut warnings = Warnings::default();

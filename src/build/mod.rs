@@ -24,6 +24,7 @@ pub mod pipeline;
 pub mod progress;
 pub mod remnant;
 pub mod reuse;
+pub mod shared_borders;
 pub mod simplify;
 pub mod skirt;
 pub mod stages;
