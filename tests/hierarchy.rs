@@ -179,3 +179,62 @@ fn errors_grow_towards_the_root() {
         }
     }
 }
+
+/// What each way of treating borders costs and leaves open; figures for docs/choices.md:
+/// `cargo test --release --test hierarchy -- --ignored --nocapture`.
+#[test]
+#[ignore = "prints figures, asserts nothing that the other tests do not"]
+fn border_figures() {
+    println!(
+        "| mesh | borders | nodes over budget | worst, x budget | skirt triangles | open edges in a mixed front | widest gap, mm | median error, mm |"
+    );
+    println!("|---|---|---:|---:|---:|---:|---:|---:|");
+    let meshes = [("ball", ball(96, 20.0, 0.002, 3)), ("wall", wall(600, 120, 4))];
+    for (name, mesh) in meshes {
+        let (piece, lattice) = block(mesh);
+        for borders in [BorderMode::Locked, BorderMode::Shared, BorderMode::Skirts] {
+            let options = HierarchyOptions { borders, ..Default::default() };
+            let nodes = build(piece.clone(), lattice, &options);
+            let deepest = nodes.iter().map(|node| node.level).max().unwrap();
+            let coarse: Vec<&Kept> = nodes.iter().filter(|node| node.level < deepest).collect();
+            let share = |node: &Kept| {
+                (node.mesh.triangles.len() + 2 * node.skirts.len()) as f64 / node.budget as f64
+            };
+            let over = coarse.iter().filter(|node| share(node) > 1.1).count();
+            let worst = coarse.iter().map(|node| share(node)).fold(0.0, f64::max);
+            let skirt_triangles: usize = coarse.iter().map(|node| 2 * node.skirts.len()).sum();
+            // A skirt is as wide as the gap that would be there without it, and a margin.
+            let skirted = HierarchyOptions { borders: BorderMode::Skirts, ..options.clone() };
+            let widest = build(piece.clone(), lattice, &skirted)
+                .iter()
+                .flat_map(|node| node.skirts.clone())
+                .map(|skirt| {
+                    let [a, b] = [0, 1].map(|i| glam::Vec3::from(skirt.corners[i]));
+                    f64::from(a.distance(b))
+                })
+                .fold(0.0, f64::max);
+            let leaf_edges: BTreeSet<_> =
+                edge_uses(nodes.iter().filter(|node| node.level == deepest).map(|node| &node.mesh))
+                    .into_keys()
+                    .collect();
+            // Every second node of level 1 as it is, the others as leaves.
+            let front: Vec<&Kept> = nodes
+                .iter()
+                .filter(|node| {
+                    let odd = node.place.first().is_some_and(|first| first % 2 == 1);
+                    if odd { node.level == 1 } else { node.level == deepest }
+                })
+                .collect();
+            let mut errors: Vec<f64> = coarse.iter().map(|node| node.error).collect();
+            errors.sort_by(f64::total_cmp);
+            println!(
+                "| {name}, {} triangles | {borders:?} | {over} of {} | {worst:.2} | {skirt_triangles} | {} | {:.1} | {:.1} |",
+                piece.mesh.triangles.len(),
+                coarse.len(),
+                unsealed(&front, &leaf_edges),
+                if borders == BorderMode::Shared { widest * 1e3 } else { 0.0 },
+                errors[errors.len() / 2] * 1e3,
+            );
+        }
+    }
+}

@@ -16,8 +16,8 @@ use crate::mesh::{PositionKey, key};
 pub type Bounds = ([f64; 3], [f64; 3]);
 
 /// Finds positions that several blocks use. `blocks` are each block's bounds and positions.
-pub fn shared_positions<'a, P>(
-    blocks: &'a [Bounds],
+pub fn shared_positions<P>(
+    blocks: &[Bounds],
     positions: impl Fn(usize) -> P,
 ) -> FxHashSet<PositionKey<f64>>
 where

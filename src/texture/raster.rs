@@ -157,7 +157,9 @@ mod tests {
         let halves = [[min, [max[0], min[1]], max], [min, max, [min[0], max[1]]]];
         let (mut by_box, mut by_halves) = (BitGrid::new(16, 16), BitGrid::new(16, 16));
         mark_box(min, max, &mut by_box);
-        halves.map(|half| Rasterizer::default().mark(half, &mut by_halves));
+        for half in halves {
+            Rasterizer::default().mark(half, &mut by_halves);
+        }
         assert_eq!(by_box, by_halves);
         let mut by_all = BitGrid::new(16, 16);
         Rasterizer::default().mark_all(halves.into_iter(), &mut by_all);
