@@ -76,6 +76,22 @@ impl DraftSource {
         }
     }
 
+    /// Positions that no cut made: those on a cutting plane are the plane's business.
+    fn uncut_positions(&self) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
+        match self {
+            Self::Parts(_) => self.positions(),
+            Self::Piece(piece) => Box::new(
+                piece
+                    .mesh
+                    .positions
+                    .iter()
+                    .zip(&piece.border.planes)
+                    .filter(|(_, planes)| **planes == 0)
+                    .map(|(position, _)| *position),
+            ),
+        }
+    }
+
     fn bounds(&self) -> ([f64; 3], [f64; 3]) {
         let empty = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         self.positions().fold(empty, |(low, high), p| {
@@ -102,7 +118,7 @@ pub fn build_input(
     let common = lattice_of(drafts.iter().filter(|draft| !draft.far));
     let shared_vertices = stages.time(Stage::Gather, || {
         let bounds: Vec<_> = drafts.iter().map(|draft| draft.source.bounds()).collect();
-        shared_positions(&bounds, |block| drafts[block].source.positions())
+        shared_positions(&bounds, |block| drafts[block].source.uncut_positions())
     });
     let cache = TextureCache::new(
         &model,
