@@ -6,6 +6,7 @@
 //! The library neither prints nor exits nor panics on input; only the programs do.
 
 pub mod build;
+pub mod camera;
 pub mod city;
 pub mod error;
 pub mod format;

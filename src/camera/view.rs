@@ -1,0 +1,31 @@
+//! What selection is told of the camera for one frame.
+
+use glam::DVec3;
+
+use super::{Frustum, Pose};
+
+/// The camera of one frame, as selection sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The camera.
+    pub pose: Pose,
+    /// Metres a second that the eye moved since the frame before; zero in the first.
+    pub velocity: DVec3,
+    /// Width and height of the picture in pixels.
+    pub size: [u32; 2],
+    /// What it sees.
+    pub frustum: Frustum,
+}
+
+impl View {
+    /// The view of a camera whose picture has `size` pixels.
+    pub fn new(pose: Pose, velocity: DVec3, size: [u32; 2]) -> Self {
+        let aspect = f64::from(size[0]) / f64::from(size[1]);
+        Self { pose, velocity, size, frustum: Frustum::new(&pose, aspect) }
+    }
+
+    /// Pixels that one metre takes at one metre's distance, in the middle of the picture.
+    pub fn pixels_per_metre(&self) -> f64 {
+        f64::from(self.size[1]) / (2.0 * (self.pose.fov_y_deg.to_radians() / 2.0).tan())
+    }
+}
