@@ -12,6 +12,8 @@ pub struct Attributes {
     pub triangles: u32,
     /// Those with an image.
     pub textured_triangles: u32,
+    /// Vertices of all primitives.
+    pub vertices: u32,
     /// Smallest source coordinates.
     pub bbox_min: [f64; 3],
     /// Largest source coordinates.
@@ -27,6 +29,7 @@ pub struct Attributes {
 /// Computes the attributes of a node; `textured_weight` is the thesis's `c_textured`.
 pub fn attributes(mesh: &NodeMesh, textured_weight: f64) -> Attributes {
     let (mut triangles, mut textured) = (0u64, 0u64);
+    let vertices: usize = mesh.primitives.iter().map(|primitive| primitive.positions.len()).sum();
     let mut area = 0f64;
     let mut normal = glam::DVec3::ZERO;
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -58,6 +61,7 @@ pub fn attributes(mesh: &NodeMesh, textured_weight: f64) -> Attributes {
     Attributes {
         triangles: triangles as u32,
         textured_triangles: textured as u32,
+        vertices: vertices as u32,
         bbox_min: low,
         bbox_max: high,
         cost: textured as f64 * textured_weight

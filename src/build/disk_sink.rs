@@ -26,8 +26,8 @@ pub struct NodeRecord {
     pub attributes: Attributes,
     /// Bound on the distance to the source, metres; not yet monotone.
     pub geometric_error: f64,
-    /// Texels of its own pictures.
-    pub own_texels: u64,
+    /// Width and height of each of its own pictures, in the order of the file.
+    pub pictures: Vec<[u32; 2]>,
     /// Texels and names of the shared pictures that it uses.
     pub shared: Vec<(String, u64)>,
     /// Steps from its root.
@@ -40,6 +40,13 @@ pub struct NodeRecord {
     pub reason: Option<String>,
     /// What was imperfect.
     pub warnings: Warnings,
+}
+
+impl NodeRecord {
+    /// Texels of its own pictures.
+    pub fn own_texels(&self) -> u64 {
+        self.pictures.iter().map(|&[width, height]| u64::from(width) * u64::from(height)).sum()
+    }
 }
 
 /// Writes the nodes of one block.
@@ -81,12 +88,18 @@ impl NodeSink for DiskSink<'_> {
         };
         let id = node_id(&file);
         let textured = self.stages.time(Stage::Atlas, || self.textured(node))?;
-        let TexturedNode { mesh, own_texels, warnings } = textured;
+        let TexturedNode { mesh, warnings, .. } = textured;
         self.stages.time(Stage::Write, || {
             let label = NodeLabel { id, level: node.level as u32 };
             let bytes = write_glb(&mesh, self.up, label)?;
             self.out.write(format!("{NODES_DIR}/{file}"), &bytes)?;
             let attributes = attributes(&mesh, self.textured_weight);
+            let pictures = mesh
+                .images
+                .iter()
+                .filter(|image| matches!(image.data, NodeImageData::Embedded { .. }))
+                .map(|image| [image.width, image.height])
+                .collect();
             let shared = mesh
                 .images
                 .iter()
@@ -105,7 +118,7 @@ impl NodeSink for DiskSink<'_> {
                 file_crc: file_crc(&bytes),
                 attributes,
                 geometric_error: node.geometric_error,
-                own_texels,
+                pictures,
                 shared,
                 level: node.level as u32,
                 budget: node.budget,

@@ -104,6 +104,7 @@ impl Earlier {
                 attributes: Attributes {
                     triangles: node.triangles,
                     textured_triangles: node.textured_triangles,
+                    vertices: node.vertices,
                     bbox_min: node.bbox_min,
                     bbox_max: node.bbox_max,
                     cost: node.cost,
@@ -111,7 +112,7 @@ impl Earlier {
                     average_normal: node.average_normal.map(f64::from),
                 },
                 geometric_error: node.geometric_error,
-                own_texels: node.texels,
+                pictures: node.pictures.clone(),
                 shared,
                 level: node.level,
                 budget: over.map_or(0, |over| over.budget as usize),

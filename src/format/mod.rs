@@ -50,7 +50,7 @@ pub const REPORT_FILE: &str = "build.json";
 /// take it for text.
 pub const SCENE_MAGIC: [u8; 8] = *b"HLODSCN\x1a";
 /// The version of the scene file that this crate writes, and the only one that it reads.
-pub const SCENE_VERSION: u32 = 1;
+pub const SCENE_VERSION: u32 = 2;
 
 /// CRC-32 (ISO-HDLC, as in zip and PNG) of a node's file, as [`Node::file_crc`] keeps it.
 pub fn file_crc(bytes: &[u8]) -> u32 {

@@ -67,6 +67,8 @@ pub struct Node {
     pub triangles: u32,
     /// Number of triangles with a picture.
     pub textured_triangles: u32,
+    /// Number of vertices in its file, at most three a triangle.
+    pub vertices: u32,
     /// Least source coordinates of the node's vertices.
     pub bbox_min: [f64; 3],
     /// Greatest source coordinates of the node's vertices.
@@ -85,6 +87,9 @@ pub struct Node {
     pub geometric_error: f64,
     /// Texels of the node's own pictures.
     pub texels: u64,
+    /// Width and height of each of the node's own pictures, in the order of its file, so that
+    /// what it takes in memory is known before it is read.
+    pub pictures: Vec<[u32; 2]>,
     /// Texels of the shared pictures that it uses.
     pub shared_texels: u64,
     /// Source coordinates of the origin of the node's file; each fits in an f32.

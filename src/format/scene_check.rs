@@ -117,6 +117,26 @@ pub enum SceneDefect {
         /// The child's error in metres.
         found: f64,
     },
+    /// Pictures that do not have as many texels as the node says.
+    #[error("node {node}: expected {texels} texels in its pictures, found {found}")]
+    Pictures {
+        /// The node.
+        node: u32,
+        /// The texels that it says it has.
+        texels: u64,
+        /// Those of its pictures.
+        found: u64,
+    },
+    /// More vertices than corners of triangles.
+    #[error("node {node}: expected at most {expected} vertices, found {found}")]
+    Vertices {
+        /// The node.
+        node: u32,
+        /// Three a triangle.
+        expected: u64,
+        /// What it says.
+        found: u32,
+    },
     /// A child of another block than its parent's.
     #[error("node {child}: expected block {parent_block} like its parent, found {}", or_none(*found))]
     BlockChanges {
@@ -278,6 +298,16 @@ impl Check<'_> {
                 triangles: node.triangles,
                 found: node.textured_triangles,
             });
+        }
+        let corners = 3 * u64::from(node.triangles);
+        if u64::from(node.vertices) > corners {
+            let (expected, found) = (corners, node.vertices);
+            self.defects.push(SceneDefect::Vertices { node: index, expected, found });
+        }
+        let area = |&[width, height]: &[u32; 2]| u64::from(width) * u64::from(height);
+        let found = node.pictures.iter().map(area).fold(0, u64::saturating_add);
+        if found != node.texels {
+            self.defects.push(SceneDefect::Pictures { node: index, texels: node.texels, found });
         }
         if let Some(block) = node.block {
             self.index(element, "block", self.scene.blocks.len(), block);

@@ -13,7 +13,7 @@ use crate::{Error, Result};
 /// Bytes of magic, version, flags and length.
 const PREFIX: usize = 24;
 /// Bytes of a node with an empty file name and no shared textures.
-const NODE_SIZE: usize = 180;
+const NODE_SIZE: usize = 188;
 
 /// Why bytes are not a scene.
 #[derive(Debug, thiserror::Error)]
@@ -198,6 +198,7 @@ fn node(cursor: &mut Cursor<'_>) -> Result<Node, Unreadable> {
         block: index(cursor, "block of a node")?,
         triangles: cursor.u32("triangles of a node")?,
         textured_triangles: cursor.u32("textured triangles of a node")?,
+        vertices: cursor.u32("vertices of a node")?,
         bbox_min: cursor.f64x3("bounding box of a node")?,
         bbox_max: cursor.f64x3("bounding box of a node")?,
         cost: cursor.f64("cost of a node")?,
@@ -217,6 +218,11 @@ fn node(cursor: &mut Cursor<'_>) -> Result<Node, Unreadable> {
         shared_textures: {
             let count = cursor.count(4, "number of shared textures of a node")?;
             (0..count).map(|_| cursor.u32("shared texture of a node")).collect::<Result<_, _>>()?
+        },
+        pictures: {
+            let count = cursor.count(8, "number of pictures of a node")?;
+            let mut side = || cursor.u32("size of a picture of a node");
+            (0..count).map(|_| Ok([side()?, side()?])).collect::<Result<_, CutShort>>()?
         },
     })
 }

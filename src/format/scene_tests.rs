@@ -283,6 +283,16 @@ fn every_defect_is_found() {
             |d| matches!(d, D::TexturedTriangles { node: 0, triangles: 900, found: 901 }),
         ),
         (
+            "vertices",
+            |s| s.nodes[2].vertices = 2701,
+            |d| matches!(d, D::Vertices { node: 2, expected: 2700, found: 2701 }),
+        ),
+        (
+            "pictures",
+            |s| s.nodes[1].pictures[0] = [256, 255],
+            |d| matches!(d, D::Pictures { node: 1, texels: 66_048, found: 65_792 }),
+        ),
+        (
             "folder in a file name",
             |s| s.nodes[0].file = "../n.glb".into(),
             |d| matches!(d, D::FileName { element: Element::Node(0), .. }),

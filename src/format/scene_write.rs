@@ -10,10 +10,11 @@
 //! count u32 · shared textures: file name text · width u32 · height u32 · bytes u64
 //! count u32 · blocks: name text · input text · origin [f64; 3]
 //! count u32 · nodes: id u64 · parent, first child, next sibling u32 · level u32 · block u32
-//!             triangles, textured triangles u32 · bounding box min and max [f64; 6]
+//!             triangles, textured triangles, vertices u32 · bounding box min and max [f64; 6]
 //!             cost, static benefit, geometric error f64 · average normal [f32; 3]
 //!             texels, shared texels u64 · origin [f64; 3] · file name text · file bytes u64
 //!             file CRC-32 u32 · count u32 · indices of shared textures u32
+//!             count u32 · own pictures: width u32 · height u32
 //! CRC-32 u32 of all that precedes
 //! ```
 
@@ -116,6 +117,7 @@ impl Sink {
         self.u32(node.block.unwrap_or(NONE));
         self.u32(node.triangles);
         self.u32(node.textured_triangles);
+        self.u32(node.vertices);
         self.f64s(&node.bbox_min);
         self.f64s(&node.bbox_max);
         self.f64s(&[node.cost, node.static_benefit, node.geometric_error]);
@@ -128,6 +130,8 @@ impl Sink {
         self.u32(node.file_crc);
         self.count(node.shared_textures.len())?;
         node.shared_textures.iter().for_each(|&texture| self.u32(texture));
+        self.count(node.pictures.len())?;
+        node.pictures.as_flattened().iter().for_each(|&side| self.u32(side));
         Ok(())
     }
 }

@@ -328,7 +328,15 @@ fn inspect_shows_a_result_to_people_and_to_programs() {
         "file",
         "file_bytes",
     ];
-    let further = ["first_child", "next_sibling", "shared_texels", "origin", "shared_textures"];
+    let further = [
+        "first_child",
+        "next_sibling",
+        "shared_texels",
+        "origin",
+        "shared_textures",
+        "vertices",
+        "pictures",
+    ];
     let mut expected: Vec<&str> = promised.into_iter().chain(further).collect();
     expected.sort_unstable();
     for node in nodes {

@@ -138,11 +138,13 @@ fn check_pictures(what: &str, case: &Case, index: usize) {
     let (scene, mesh) = (&case.built.scene, &case.built.meshes[index]);
     let node = &scene.nodes[index];
     let (mut own, mut shared, mut names) = (0, 0, BTreeSet::new());
+    let mut pictures = Vec::new();
     for image in &mesh.images {
         let texels = u64::from(image.width) * u64::from(image.height);
         let decoded = match &image.data {
             NodeImageData::Embedded { bytes, .. } => {
                 own += texels;
+                pictures.push([image.width, image.height]);
                 image::load_from_memory(bytes).unwrap()
             }
             NodeImageData::Shared { file_name } => {
@@ -154,6 +156,9 @@ fn check_pictures(what: &str, case: &Case, index: usize) {
         assert_eq!([decoded.width(), decoded.height()], [image.width, image.height], "{what}");
     }
     assert_eq!((node.texels, node.shared_texels), (own, shared), "{what}");
+    assert_eq!(node.pictures, pictures, "{what}");
+    let vertices: usize = mesh.primitives.iter().map(|primitive| primitive.positions.len()).sum();
+    assert_eq!(node.vertices as usize, vertices, "{what}");
     let listed: BTreeSet<String> = node
         .shared_textures
         .iter()
