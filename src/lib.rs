@@ -13,6 +13,7 @@ pub mod format;
 pub mod import;
 pub mod mesh;
 pub mod report;
+pub mod runtime;
 pub mod texture;
 
 pub use error::{Error, Result};

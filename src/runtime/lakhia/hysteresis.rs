@@ -1,0 +1,110 @@
+//! The counters that keep levels from switching at every change (thesis, section 4.2,
+//! "Hysteresis").
+
+use super::{LakhiaOptions, StartOfHysteresis};
+
+/// One counter a node.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Hysteresis {
+    /// NaN where a node was never visited.
+    counters: Vec<f64>,
+}
+
+impl Hysteresis {
+    pub fn resize(&mut self, nodes: usize) {
+        self.counters.resize(nodes, f64::NAN);
+    }
+
+    pub fn is_new(&self, node: u32) -> bool {
+        self.counters[node as usize].is_nan()
+    }
+
+    /// Where the counter of a node begins that is visited for the first time; `affordable` says
+    /// that its siblings' share of time suffices for all of them.
+    pub fn start(&mut self, node: u32, affordable: bool, options: &LakhiaOptions) {
+        self.counters[node as usize] = match options.hyst_start {
+            StartOfHysteresis::Affordable if !affordable => {
+                -(2.0 * options.hyst_switch).min(options.hyst_limit)
+            }
+            _ => 0.0,
+        };
+    }
+
+    /// `hyst ← hyst + (timeSlice − timeNeeded) / timeNeeded`, kept within ± `c_hystLimit`.
+    pub fn update(&mut self, node: u32, time_slice: f64, time_needed: f64, limit: f64) {
+        let urgency = match time_slice - time_needed {
+            0.0 => 0.0,
+            missing_or_left => missing_or_left / time_needed,
+        };
+        let counter = &mut self.counters[node as usize];
+        *counter = (*counter + urgency).clamp(-limit, limit);
+    }
+
+    /// `trunc(hyst / c_hystSwitch)`, which siblings sum up to `cumHyst`.
+    pub fn truncated(&self, node: u32, switch: f64) -> f64 {
+        (self.counters[node as usize] / switch).trunc()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fresh() -> Hysteresis {
+        let mut hysteresis = Hysteresis::default();
+        hysteresis.resize(1);
+        hysteresis.start(0, true, &LakhiaOptions::default());
+        hysteresis
+    }
+
+    #[test]
+    fn counters_move_by_urgency() {
+        let mut hysteresis = fresh();
+        hysteresis.update(0, 3.0, 2.0, 10.0);
+        assert_eq!(hysteresis.counters[0], 0.5);
+        hysteresis.update(0, 0.5, 2.0, 10.0);
+        assert_eq!(hysteresis.counters[0], -0.25);
+    }
+
+    #[test]
+    fn counters_stay_within_the_limit() {
+        let mut hysteresis = fresh();
+        hysteresis.update(0, 1e9, 1.0, 10.0);
+        assert_eq!(hysteresis.counters[0], 10.0);
+        for _ in 0..100 {
+            hysteresis.update(0, 0.0, 1.0, 10.0);
+        }
+        assert_eq!(hysteresis.counters[0], -10.0);
+    }
+
+    #[test]
+    fn only_whole_switches_count_and_truncation_is_towards_zero() {
+        let mut hysteresis = fresh();
+        for (counter, expected) in
+            [(1499.0, 0.0), (1500.0, 1.0), (4510.0, 3.0), (-1499.0, 0.0), (-1500.0, -1.0)]
+        {
+            hysteresis.counters[0] = counter;
+            assert_eq!(hysteresis.truncated(0, 1500.0), expected, "{counter}");
+        }
+    }
+
+    #[test]
+    fn nodes_that_take_no_time_never_make_a_counter_meaningless() {
+        let mut hysteresis = fresh();
+        hysteresis.update(0, 1.0, 0.0, 10.0);
+        assert_eq!(hysteresis.counters[0], 10.0);
+        hysteresis.update(0, 0.0, 0.0, 10.0);
+        assert_eq!(hysteresis.counters[0], 10.0);
+    }
+
+    #[test]
+    fn siblings_that_cost_too_much_begin_low_unless_told_otherwise() {
+        let mut hysteresis = fresh();
+        let mut options = LakhiaOptions::default();
+        hysteresis.start(0, false, &options);
+        assert_eq!(hysteresis.counters[0], -3000.0);
+        options.hyst_start = StartOfHysteresis::Zero;
+        hysteresis.start(0, false, &options);
+        assert_eq!(hysteresis.counters[0], 0.0);
+    }
+}

@@ -1,0 +1,15 @@
+//! The engine at run time, without files, threads of its own, or a graphics card: which nodes a
+//! frame draws ([`Policy`]).
+//!
+//! Time enters as an argument, so that a run can be replayed exactly.
+
+pub mod lakhia;
+mod policy;
+#[cfg(test)]
+pub(crate) mod test_tree;
+mod toggles;
+mod tree;
+
+pub use policy::{FrameOutcome, Policy, Residents, Selection};
+pub use toggles::{ToggleCounter, Toggles};
+pub use tree::{SceneTree, TreeNode};
