@@ -1,10 +1,11 @@
 //! The engine at run time, without files, threads of its own, or a graphics card: which nodes a
-//! frame draws ([`Policy`]).
+//! frame draws ([`Policy`]) and which are in memory ([`residency`]).
 //!
 //! Time enters as an argument, so that a run can be replayed exactly.
 
 pub mod lakhia;
 mod policy;
+pub mod residency;
 #[cfg(test)]
 pub(crate) mod test_tree;
 mod toggles;

@@ -1,0 +1,67 @@
+//! Every byte that is held or being loaded.
+
+use super::Sizes;
+
+/// Every byte that is held or being loaded, against a cap.
+#[derive(Clone, Debug)]
+pub(super) struct Ledger {
+    cap: u64,
+    used: u64,
+    peak: u64,
+    /// By shared picture: the nodes that need it and are held or being loaded.
+    users: Vec<u32>,
+}
+
+impl Ledger {
+    pub fn new(cap: u64, textures: usize) -> Self {
+        Self { cap, used: 0, peak: 0, users: vec![0; textures] }
+    }
+
+    pub fn used(&self) -> u64 {
+        self.used
+    }
+
+    pub fn peak(&self) -> u64 {
+        self.peak
+    }
+
+    pub fn free(&self) -> u64 {
+        self.cap - self.used
+    }
+
+    /// Bytes that holding a node takes beyond what is held already.
+    pub fn held(&self, sizes: &Sizes, node: u32) -> u64 {
+        let size = &sizes.nodes[node as usize];
+        let unused = size.textures.iter().filter(|&&texture| self.users[texture as usize] == 0);
+        size.held_bytes + unused.map(|&t| sizes.textures[t as usize].held_bytes).sum::<u64>()
+    }
+
+    /// Reserves bytes for a node and for what is read of its files; the caller has made room.
+    pub fn reserve(&mut self, sizes: &Sizes, node: u32, read_bytes: u64) {
+        self.used += self.held(sizes, node) + read_bytes;
+        debug_assert!(self.used <= self.cap, "{} of {} bytes", self.used, self.cap);
+        self.peak = self.peak.max(self.used);
+        for &texture in &sizes.nodes[node as usize].textures {
+            self.users[texture as usize] += 1;
+        }
+    }
+
+    /// Gives back the bytes read, once they are decoded.
+    pub fn release_read(&mut self, read_bytes: u64) {
+        self.used -= read_bytes;
+    }
+
+    /// Gives back what a node held; calls `gone` with shared pictures that nobody needs any more.
+    pub fn release(&mut self, sizes: &Sizes, node: u32, mut gone: impl FnMut(u32)) {
+        let size = &sizes.nodes[node as usize];
+        self.used -= size.held_bytes;
+        for &texture in &size.textures {
+            let users = &mut self.users[texture as usize];
+            *users -= 1;
+            if *users == 0 {
+                self.used -= sizes.textures[texture as usize].held_bytes;
+                gone(texture);
+            }
+        }
+    }
+}

@@ -1,0 +1,474 @@
+//! What is loaded next, and what makes room for it.
+
+use super::ledger::Ledger;
+use super::{PriorityList, ResidencyOptions, Sizes};
+use crate::runtime::SceneTree;
+use crate::{Error, Result};
+
+/// How many nodes are tried, in order of priority, before loading waits for memory.
+const CANDIDATES: usize = 16;
+
+/// Where a node is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NodeState {
+    /// On disk only.
+    Absent,
+    /// Being read, or suspended; this many bytes of its files have been.
+    Loading {
+        /// Bytes read.
+        read: u64,
+    },
+    /// Read and decoded, not yet where drawing can use it.
+    Loaded,
+    /// Ready to be drawn.
+    Resident,
+    /// Given up; its memory is free once drawing lets go of it.
+    Leaving,
+    /// Its files cannot be used.
+    Broken,
+}
+
+/// A portion to be read: bytes `from..from + bytes` of the node's file followed by those of the
+/// shared pictures that it needs and that are not in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// Whose.
+    pub node: u32,
+    /// Bytes read before.
+    pub from: u64,
+    /// Bytes to be read now; 0 only where nothing is missing.
+    pub bytes: u64,
+}
+
+/// What drawing takes over and lets go of before a frame.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Changes {
+    /// Nodes that become resident.
+    pub arrived: Vec<u32>,
+    /// Nodes whose memory is to be freed.
+    pub left: Vec<u32>,
+    /// Shared pictures whose memory is to be freed.
+    pub left_textures: Vec<u32>,
+}
+
+/// What has happened so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Counters {
+    /// Bytes of files that were read.
+    pub read_bytes: u64,
+    /// Nodes that were loaded.
+    pub loads: u64,
+    /// Nodes that made room.
+    pub evictions: u64,
+    /// Loads that were suspended for a more important one.
+    pub suspensions: u64,
+    /// Loads that were given up half way.
+    pub abandoned: u64,
+}
+
+/// Which nodes are in memory.
+///
+/// A node is loaded only once its parent is resident, and makes room only once none of its
+/// children is in memory, so that whatever is drawn can always be replaced by its parent. Roots
+/// never leave.
+#[derive(Clone, Debug)]
+pub struct Residency {
+    options: ResidencyOptions,
+    sizes: Sizes,
+    ledger: Ledger,
+    list: PriorityList,
+    states: Vec<NodeState>,
+    parents: Vec<Option<u32>>,
+    /// By node: children that are not absent.
+    children_held: Vec<u32>,
+    /// By node: bytes to be read in all, fixed when its load begins.
+    to_read: Vec<u64>,
+    /// By shared picture: whether it is in memory.
+    textures_held: Vec<bool>,
+    /// By node: the frame in which it was visited last.
+    visited: Vec<u64>,
+    frame: u64,
+    /// Loaded, in the order in which they were.
+    arrivals: Vec<u32>,
+    /// Leaving.
+    leaving: Vec<u32>,
+    /// Being read or suspended.
+    loading: Vec<u32>,
+    /// The load that was given the last portion.
+    current: Option<u32>,
+    resident: usize,
+    /// Where [`Residency::stale`] goes on.
+    cursor: usize,
+    counters: Counters,
+}
+
+impl Residency {
+    /// Nothing in memory yet; [`load_root`](Self::load_root) comes next. Fails where the roots
+    /// alone do not fit below the cap.
+    pub fn new(tree: &SceneTree, sizes: Sizes, options: ResidencyOptions) -> Result<Self> {
+        let nodes = tree.len();
+        let residency = Self {
+            ledger: Ledger::new(options.max_memory_bytes, sizes.textures.len()),
+            list: PriorityList::new(nodes),
+            states: vec![NodeState::Absent; nodes],
+            parents: (0..nodes as u32).map(|node| tree.node(node).parent).collect(),
+            children_held: vec![0; nodes],
+            to_read: vec![0; nodes],
+            textures_held: vec![false; sizes.textures.len()],
+            visited: vec![0; nodes],
+            frame: 0,
+            arrivals: Vec::new(),
+            leaving: Vec::new(),
+            loading: Vec::new(),
+            current: None,
+            resident: 0,
+            cursor: 0,
+            counters: Counters::default(),
+            options,
+            sizes,
+        };
+        let needed = residency.bytes_for_roots(tree);
+        if needed > options.max_memory_bytes {
+            return Err(Error::Usage(format!(
+                "--max-memory: expected at least {needed} bytes, which the {} roots take while \
+                 they are loaded, found {}; build with a lower --desired-tris or fewer blocks to \
+                 make roots smaller",
+                tree.roots().len(),
+                options.max_memory_bytes
+            )));
+        }
+        Ok(residency)
+    }
+
+    /// Bytes that all roots take, the largest of them while its files are read.
+    fn bytes_for_roots(&self, tree: &SceneTree) -> u64 {
+        let mut ledger = Ledger::new(u64::MAX, self.sizes.textures.len());
+        for &root in tree.roots() {
+            let read = self.files(root, &vec![false; self.sizes.textures.len()]);
+            ledger.reserve(&self.sizes, root, read);
+            ledger.release_read(read);
+        }
+        ledger.peak()
+    }
+
+    /// Bytes of the files that loading a node reads.
+    fn files(&self, node: u32, held: &[bool]) -> u64 {
+        let size = &self.sizes.nodes[node as usize];
+        let missing = size.textures.iter().filter(|&&texture| !held[texture as usize]);
+        size.file_bytes + missing.map(|&t| self.sizes.textures[t as usize].file_bytes).sum::<u64>()
+    }
+
+    /// Where a node is.
+    pub fn state(&self, node: u32) -> NodeState {
+        self.states[node as usize]
+    }
+
+    /// Bytes that the load of a node reads in all.
+    #[cfg(test)]
+    pub(super) fn files_of_load(&self, node: u32) -> u64 {
+        self.to_read[node as usize]
+    }
+
+    /// Whether a shared picture is in memory, or arrives with a node that is loaded.
+    pub fn has_texture(&self, texture: u32) -> bool {
+        self.textures_held[texture as usize]
+    }
+
+    /// Bytes in use: held for drawing, decoded, and read by loads under way.
+    pub fn used_bytes(&self) -> u64 {
+        self.ledger.used()
+    }
+
+    /// The most bytes that were ever in use.
+    pub fn peak_bytes(&self) -> u64 {
+        self.ledger.peak()
+    }
+
+    /// Number of nodes that can be drawn.
+    pub fn resident(&self) -> usize {
+        self.resident
+    }
+
+    /// Nodes visited in the last frame that are not in memory: how many loads wait.
+    pub fn waiting(&self) -> usize {
+        let mut count = 0;
+        let mut at = self.list.first_unloaded();
+        while let Some(node) = at {
+            count += usize::from(self.wants(node));
+            at = self.list.after(node);
+        }
+        count
+    }
+
+    /// What has happened so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// Begins to load a root, before the first frame: all of its files are to be read, after
+    /// which [`loaded`](Self::loaded) or [`broken`](Self::broken) is to be called.
+    pub fn load_root(&mut self, root: u32) -> Step {
+        self.begin(root);
+        let bytes = self.to_read[root as usize];
+        Step { node: root, from: 0, bytes }
+    }
+
+    /// Takes the priorities of a frame: of the nodes visited, and of some others.
+    pub fn set_priorities(&mut self, visited: &[(u32, f64)], others: &[(u32, f64)]) {
+        self.frame += 1;
+        for &(node, _) in visited {
+            self.visited[node as usize] = self.frame;
+        }
+        self.list.update(visited);
+        self.list.update(others);
+    }
+
+    /// Nodes in memory that the last frame did not visit, at most `count`, in turn: their
+    /// priorities should be looked at from time to time.
+    pub fn stale(&mut self, count: usize, out: &mut Vec<u32>) {
+        out.clear();
+        for _ in 0..(8 * count).min(self.states.len()) {
+            self.cursor = (self.cursor + 1) % self.states.len();
+            let held = self.states[self.cursor] == NodeState::Resident;
+            if held && self.visited[self.cursor] != self.frame {
+                out.push(self.cursor as u32);
+            }
+            if out.len() == count {
+                break;
+            }
+        }
+    }
+
+    /// What to read now: a portion of the most important node that is not in memory and for
+    /// which there is room or can be made. `None` where there is nothing to do until something
+    /// changes.
+    pub fn next_step(&mut self) -> Option<Step> {
+        let mut at = self.list.first_unloaded();
+        let mut tried = 0;
+        while let Some(node) = at {
+            at = self.list.after(node);
+            match self.states[node as usize] {
+                NodeState::Absent if self.visited[node as usize] != self.frame => {
+                    self.list.remove(node); // no longer of interest to anyone
+                }
+                NodeState::Absent if self.wants(node) => {
+                    if self.make_room(node) {
+                        self.begin(node);
+                        return Some(self.portion(node));
+                    }
+                    tried += 1;
+                }
+                NodeState::Loading { .. } if self.visited[node as usize] == self.frame => {
+                    return Some(self.portion(node));
+                }
+                _ => {}
+            }
+            if tried == CANDIDATES {
+                break;
+            }
+        }
+        None
+    }
+
+    /// Visited in the last frame, not in memory, and the parent is.
+    fn wants(&self, node: u32) -> bool {
+        let parent_resident = self.parents[node as usize]
+            .is_some_and(|parent| self.states[parent as usize] == NodeState::Resident);
+        let outside =
+            matches!(self.states[node as usize], NodeState::Absent | NodeState::Loading { .. });
+        outside && parent_resident && self.visited[node as usize] == self.frame
+    }
+
+    fn portion(&mut self, node: u32) -> Step {
+        let NodeState::Loading { read } = self.states[node as usize] else {
+            return Step { node, from: 0, bytes: 0 };
+        };
+        if let Some(other) = self.current.filter(|&other| other != node) {
+            let suspended = matches!(self.states[other as usize], NodeState::Loading { .. });
+            self.counters.suspensions += u64::from(suspended);
+        }
+        self.current = Some(node);
+        let left = self.to_read[node as usize] - read;
+        Step { node, from: read, bytes: left.min(self.options.portion_bytes) }
+    }
+
+    /// A portion was read; true where it was the last, after which [`loaded`](Self::loaded) or
+    /// [`broken`](Self::broken) is to be called. False too where the load was given up meanwhile.
+    pub fn portion_read(&mut self, node: u32, bytes: u64) -> bool {
+        let NodeState::Loading { read } = &mut self.states[node as usize] else { return false };
+        *read += bytes;
+        self.counters.read_bytes += bytes;
+        *read >= self.to_read[node as usize]
+    }
+
+    /// A node was decoded and waits for drawing to take it.
+    pub fn loaded(&mut self, node: u32) {
+        if !matches!(self.states[node as usize], NodeState::Loading { .. }) {
+            return;
+        }
+        self.end_reading(node);
+        self.states[node as usize] = NodeState::Loaded;
+        for &texture in &self.sizes.nodes[node as usize].textures {
+            self.textures_held[texture as usize] = true;
+        }
+        self.list.set_loaded(node, true);
+        self.arrivals.push(node);
+        self.counters.loads += 1;
+    }
+
+    /// A node's files cannot be used: it is never asked for again.
+    pub fn broken(&mut self, node: u32) {
+        if !matches!(self.states[node as usize], NodeState::Loading { .. }) {
+            return;
+        }
+        self.end_reading(node);
+        self.forget(node, NodeState::Broken, &mut Vec::new());
+        self.list.set_loaded(node, true);
+        self.list.remove(node);
+    }
+
+    /// What drawing takes over and lets go of before it draws a frame. After this call arrived
+    /// nodes are resident and the memory of those that left is free.
+    pub fn begin_frame(&mut self) -> Changes {
+        let mut changes = Changes::default();
+        for node in std::mem::take(&mut self.leaving) {
+            self.forget(node, NodeState::Absent, &mut changes.left_textures);
+            changes.left.push(node);
+        }
+        let mut bytes = 0;
+        let mut taken = 0;
+        for &node in &self.arrivals {
+            bytes += self.sizes.nodes[node as usize].held_bytes;
+            if taken > 0 && bytes > self.options.upload_bytes && self.frame > 0 {
+                break;
+            }
+            taken += 1;
+        }
+        changes.arrived = self.arrivals.drain(..taken).collect();
+        for &node in &changes.arrived {
+            self.states[node as usize] = NodeState::Resident;
+        }
+        self.resident += taken;
+        changes
+    }
+
+    fn begin(&mut self, node: u32) {
+        let read = self.files(node, &self.textures_held);
+        self.to_read[node as usize] = read;
+        self.ledger.reserve(&self.sizes, node, read);
+        self.states[node as usize] = NodeState::Loading { read: 0 };
+        self.loading.push(node);
+        if let Some(parent) = self.parents[node as usize] {
+            self.children_held[parent as usize] += 1;
+        }
+    }
+
+    fn end_reading(&mut self, node: u32) {
+        self.ledger.release_read(self.to_read[node as usize]);
+        self.loading.retain(|&other| other != node);
+    }
+
+    /// Gives back what a node held.
+    fn forget(&mut self, node: u32, state: NodeState, gone: &mut Vec<u32>) {
+        let held = &mut self.textures_held;
+        self.ledger.release(&self.sizes, node, |texture| {
+            if std::mem::take(&mut held[texture as usize]) {
+                gone.push(texture);
+            }
+        });
+        self.states[node as usize] = state;
+        if let Some(parent) = self.parents[node as usize] {
+            self.children_held[parent as usize] -= 1;
+        }
+    }
+
+    /// True where there is room for a node; otherwise room is made where what is less important
+    /// suffices, which is free from the next frame on. Nothing is given up in vain.
+    fn make_room(&mut self, node: u32) -> bool {
+        let needed = |this: &Self| {
+            this.ledger.held(&this.sizes, node) + this.files(node, &this.textures_held)
+        };
+        if needed(self) <= self.ledger.free() {
+            return true;
+        }
+        let leaving: u64 = self.leaving.iter().map(|&node| self.least_freed(node)).sum();
+        let mut missing = needed(self).saturating_sub(self.ledger.free() + leaving);
+        if missing == 0 {
+            return false; // room has been made and is free at the next frame
+        }
+        let priority = self.list.priority(node);
+        // Loads under way that matter less go first: nothing of them is drawn.
+        let mut abandoned = Vec::new();
+        for &other in &self.loading {
+            if missing > 0 && other != node && self.gives_way(other, priority) {
+                let freed = self.least_freed(other) + self.to_read[other as usize];
+                missing = missing.saturating_sub(freed);
+                abandoned.push(other);
+            }
+        }
+        let mut victims = Vec::new();
+        let mut at = self.list.last();
+        while let (Some(other), true) = (at, missing > 0) {
+            if self.list.priority(other) * (1.0 + self.options.evict_margin) >= priority {
+                break;
+            }
+            at = self.list.before(other);
+            if self.may_leave(other, &victims) && !self.is_above(other, node) {
+                missing = missing.saturating_sub(self.least_freed(other));
+                victims.push(other);
+                // Its parent may leave now, and may have been passed on the way here.
+                if let Some(parent) = self.parents[other as usize]
+                    && self.list.precedes_or_is(other, parent)
+                {
+                    at = Some(parent);
+                }
+            }
+        }
+        if missing > 0 {
+            return false;
+        }
+        for other in abandoned {
+            self.end_reading(other);
+            self.forget(other, NodeState::Absent, &mut Vec::new());
+            self.counters.abandoned += 1;
+        }
+        for &other in &victims {
+            self.states[other as usize] = NodeState::Leaving;
+            self.list.set_loaded(other, false);
+            self.resident -= 1;
+        }
+        self.counters.evictions += victims.len() as u64;
+        self.leaving.extend(victims);
+        needed(self) <= self.ledger.free()
+    }
+
+    /// A load under way that is of less importance than `priority`, or that nobody asks for.
+    fn gives_way(&self, other: u32, priority: f64) -> bool {
+        self.visited[other as usize] != self.frame
+            || self.list.priority(other) * (1.0 + self.options.evict_margin) < priority
+    }
+
+    /// Resident, not a root, and without children in memory other than `victims`.
+    fn may_leave(&self, node: u32, victims: &[u32]) -> bool {
+        if self.states[node as usize] != NodeState::Resident
+            || self.parents[node as usize].is_none()
+            || victims.contains(&node)
+        {
+            return false;
+        }
+        let held = self.children_held[node as usize];
+        let leaving = |&&other: &&u32| self.parents[other as usize] == Some(node);
+        held == 0 || held as usize == victims.iter().filter(leaving).count()
+    }
+
+    /// Whether `above` is an ancestor of `node`.
+    fn is_above(&self, above: u32, node: u32) -> bool {
+        std::iter::successors(self.parents[node as usize], |&at| self.parents[at as usize])
+            .any(|at| at == above)
+    }
+
+    /// Bytes that are free for certain once a node is gone; shared pictures may stay.
+    fn least_freed(&self, node: u32) -> u64 {
+        self.sizes.nodes[node as usize].held_bytes
+    }
+}

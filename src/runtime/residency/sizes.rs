@@ -1,0 +1,66 @@
+//! How many bytes things take, on disk and in memory.
+
+use crate::format::Scene;
+
+/// Bytes of one node.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct NodeSize {
+    /// Of its file.
+    pub file_bytes: u64,
+    /// Of its geometry and its own pictures as held for drawing.
+    pub held_bytes: u64,
+    /// Indices of the shared pictures that it needs.
+    pub textures: Vec<u32>,
+}
+
+/// Bytes of one picture that nodes share.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TextureSize {
+    /// Of its file.
+    pub file_bytes: u64,
+    /// As held for drawing.
+    pub held_bytes: u64,
+}
+
+/// Bytes of everything in a scene.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Sizes {
+    /// By node.
+    pub nodes: Vec<NodeSize>,
+    /// By shared picture.
+    pub textures: Vec<TextureSize>,
+}
+
+impl Sizes {
+    /// The sizes of a scene; `node` and `picture` say how many bytes are held for drawing: of
+    /// vertices, triangles and own pictures, and of one picture.
+    pub fn new(
+        scene: &Scene,
+        node: impl Fn(u32, u32, &[[u32; 2]]) -> u64,
+        picture: impl Fn([u32; 2]) -> u64,
+    ) -> Self {
+        let nodes = scene
+            .nodes
+            .iter()
+            .map(|entry| {
+                let mut textures = entry.shared_textures.clone();
+                textures.sort_unstable();
+                textures.dedup();
+                NodeSize {
+                    file_bytes: entry.file_bytes,
+                    held_bytes: node(entry.vertices, entry.triangles, &entry.pictures),
+                    textures,
+                }
+            })
+            .collect();
+        let textures = scene
+            .shared_textures
+            .iter()
+            .map(|texture| TextureSize {
+                file_bytes: texture.bytes,
+                held_bytes: picture([texture.width, texture.height]),
+            })
+            .collect();
+        Self { nodes, textures }
+    }
+}

@@ -1,0 +1,332 @@
+//! Loading, eviction and the cap, on small hierarchies, with whoever loads played by the test.
+
+use super::*;
+use crate::runtime::SceneTree;
+use crate::runtime::test_tree::{Sketch, sketch, tree};
+
+const HELD: u64 = 500;
+const FILE: u64 = 1000;
+
+fn sizes(nodes: usize) -> Sizes {
+    let node = NodeSize { file_bytes: FILE, held_bytes: HELD, textures: Vec::new() };
+    Sizes { nodes: vec![node; nodes], textures: Vec::new() }
+}
+
+fn options(max_memory_bytes: u64) -> ResidencyOptions {
+    ResidencyOptions { max_memory_bytes, portion_bytes: 400, ..ResidencyOptions::default() }
+}
+
+fn leaf() -> Sketch {
+    sketch([0.0; 3], 1.0, vec![])
+}
+
+/// 0 (1 (2 3) 4 (5 6))
+fn two_levels() -> SceneTree {
+    let pair = || sketch([0.0; 3], 1.0, vec![leaf(), leaf()]);
+    tree(vec![sketch([0.0; 3], 1.0, vec![pair(), pair()])])
+}
+
+fn started(tree: &SceneTree, sizes: Sizes, options: ResidencyOptions) -> Residency {
+    let mut residency = Residency::new(tree, sizes, options).unwrap();
+    for &root in tree.roots() {
+        let step = residency.load_root(root);
+        assert!(residency.portion_read(root, step.bytes));
+        residency.loaded(root);
+    }
+    assert_eq!(residency.begin_frame().arrived, tree.roots());
+    residency
+}
+
+/// Promises that hold at any time, recomputed.
+fn check(residency: &Residency, tree: &SceneTree, sizes: &Sizes, cap: u64) {
+    assert!(residency.used_bytes() <= cap && residency.peak_bytes() <= cap);
+    let mut used = 0;
+    let mut textures = vec![false; sizes.textures.len()];
+    for node in 0..tree.len() as u32 {
+        let state = residency.state(node);
+        let held = !matches!(state, NodeState::Absent | NodeState::Broken);
+        let size = &sizes.nodes[node as usize];
+        if held {
+            used += size.held_bytes;
+            size.textures.iter().for_each(|&texture| textures[texture as usize] = true);
+        }
+        if matches!(state, NodeState::Loading { .. }) {
+            used += residency.files_of_load(node);
+        }
+        if let (true, Some(parent)) = (held, tree.node(node).parent) {
+            let above = residency.state(parent);
+            let both = state == NodeState::Leaving && above == NodeState::Leaving;
+            assert!(above == NodeState::Resident || both, "{above:?} above node {node}");
+        }
+    }
+    for (texture, size) in textures.iter().zip(&sizes.textures) {
+        used += if *texture { size.held_bytes } else { 0 };
+    }
+    assert_eq!(residency.used_bytes(), used);
+}
+
+/// Reads until there is nothing to do; the nodes loaded, in order.
+fn load_all(residency: &mut Residency) -> Vec<u32> {
+    let mut loaded = Vec::new();
+    while let Some(step) = residency.next_step() {
+        if residency.portion_read(step.node, step.bytes) {
+            residency.loaded(step.node);
+            loaded.push(step.node);
+        }
+    }
+    loaded
+}
+
+/// Frames until nothing changes any more; the nodes loaded and left, in order.
+fn settle(residency: &mut Residency, priorities: &[(u32, f64)]) -> (Vec<u32>, Vec<u32>) {
+    let (mut loaded, mut left) = (Vec::new(), Vec::new());
+    for _ in 0..50 {
+        left.extend(residency.begin_frame().left);
+        residency.set_priorities(priorities, &[]);
+        loaded.extend(load_all(residency));
+    }
+    (loaded, left)
+}
+
+#[test]
+fn the_most_important_node_is_loaded_first_and_children_after_their_parent() {
+    let tree = two_levels();
+    let mut residency = started(&tree, sizes(7), options(1 << 20));
+    let priorities = [(0, 9.0), (1, 3.0), (4, 5.0), (2, 8.0), (3, 7.0), (5, 1.0), (6, 2.0)];
+    residency.set_priorities(&priorities, &[]);
+    assert_eq!(load_all(&mut residency), [4, 1], "children wait for their parents to arrive");
+    residency.begin_frame();
+    residency.set_priorities(&priorities, &[]);
+    assert_eq!(load_all(&mut residency), [2, 3, 6, 5]);
+}
+
+#[test]
+fn a_load_is_suspended_for_a_more_important_one_and_resumed() {
+    let tree = two_levels();
+    let mut residency = started(&tree, sizes(7), options(1 << 20));
+    residency.set_priorities(&[(0, 9.0), (1, 3.0), (4, 2.0)], &[]);
+    let step = residency.next_step().unwrap();
+    assert_eq!(step, Step { node: 1, from: 0, bytes: 400 });
+    assert!(!residency.portion_read(1, 400));
+    residency.set_priorities(&[(0, 9.0), (1, 3.0), (4, 4.0)], &[]);
+    assert_eq!(residency.next_step(), Some(Step { node: 4, from: 0, bytes: 400 }));
+    assert_eq!(residency.state(1), NodeState::Loading { read: 400 });
+    assert_eq!(residency.counters().suspensions, 1);
+    residency.set_priorities(&[(0, 9.0), (1, 5.0), (4, 4.0)], &[]);
+    assert_eq!(residency.next_step(), Some(Step { node: 1, from: 400, bytes: 400 }));
+    assert!(!residency.portion_read(1, 400));
+    assert_eq!(residency.next_step(), Some(Step { node: 1, from: 800, bytes: 200 }));
+    assert!(residency.portion_read(1, 200));
+}
+
+#[test]
+fn what_is_no_longer_visited_is_not_loaded() {
+    let tree = two_levels();
+    let mut residency = started(&tree, sizes(7), options(1 << 20));
+    residency.set_priorities(&[(0, 9.0), (1, 3.0), (4, 2.0)], &[]);
+    residency.set_priorities(&[(0, 9.0)], &[]);
+    assert_eq!(residency.next_step(), None);
+    assert_eq!(residency.waiting(), 0);
+}
+
+#[test]
+fn the_cap_holds_and_less_important_nodes_make_room() {
+    let tree = two_levels();
+    // Root, one more held, and the file of a third.
+    let cap = 2 * HELD + HELD + FILE;
+    let mut residency = started(&tree, sizes(7), options(cap));
+    let (loaded, left) = settle(&mut residency, &[(0, 9.0), (1, 3.0), (4, 2.0)]);
+    assert_eq!((loaded, left), (vec![1, 4], vec![]));
+    // No room to read a fourth: 2 is worth more than 4, so 4 leaves.
+    let priorities = [(0, 9.0), (1, 3.0), (4, 0.5), (2, 2.0), (3, 0.1)];
+    let (loaded, left) = settle(&mut residency, &priorities);
+    assert_eq!((loaded, left), (vec![2], vec![4]));
+    check(&residency, &tree, &sizes(7), cap);
+}
+
+#[test]
+fn roots_and_the_ancestors_of_what_is_loaded_stay() {
+    let tree = two_levels();
+    let cap = 2 * HELD + FILE;
+    let mut residency = started(&tree, sizes(7), options(cap));
+    settle(&mut residency, &[(0, 0.1), (1, 0.2), (4, 0.1)]);
+    assert_eq!(residency.state(1), NodeState::Resident);
+    let (loaded, left) = settle(&mut residency, &[(0, 0.1), (1, 0.2), (2, 99.0), (3, 99.0)]);
+    assert_eq!((loaded, left), (vec![], vec![]), "only the root and 2's parent could leave");
+    assert_eq!(residency.used_bytes(), 2 * HELD);
+}
+
+#[test]
+fn nearly_equal_priorities_do_not_push_each_other_out() {
+    let tree = two_levels();
+    let cap = 2 * HELD + FILE;
+    let mut residency = started(&tree, sizes(7), options(cap));
+    settle(&mut residency, &[(0, 9.0), (1, 1.0), (4, 0.99)]);
+    let before = residency.counters();
+    for frame in 0..200 {
+        let sway = if frame % 2 == 0 { 0.04 } else { -0.04 };
+        residency.begin_frame();
+        residency.set_priorities(&[(0, 9.0), (1, 1.0 + sway), (4, 1.0 - sway)], &[]);
+        load_all(&mut residency);
+        check(&residency, &tree, &sizes(7), cap);
+    }
+    assert_eq!(residency.counters(), before);
+    // A difference beyond the margin does.
+    let (loaded, left) = settle(&mut residency, &[(0, 9.0), (1, 1.0), (4, 1.2)]);
+    assert_eq!((loaded, left), (vec![4], vec![1]));
+}
+
+#[test]
+fn room_is_not_made_in_vain() {
+    let tree = two_levels();
+    let mut sizes = sizes(7);
+    sizes.nodes[4].held_bytes = 1 << 20;
+    let cap = 4 * HELD + FILE;
+    let mut residency = started(&tree, sizes.clone(), options(cap));
+    let (loaded, left) = settle(&mut residency, &[(0, 9.0), (1, 1.0), (4, 50.0)]);
+    assert_eq!((loaded, left), (vec![1], vec![]), "4 never fits, 1 does");
+    check(&residency, &tree, &sizes, cap);
+}
+
+#[test]
+fn a_broken_node_is_never_asked_for_again_and_gives_its_memory_back() {
+    let tree = two_levels();
+    let mut residency = started(&tree, sizes(7), options(1 << 20));
+    residency.set_priorities(&[(0, 9.0), (1, 3.0), (4, 2.0)], &[]);
+    assert_eq!(residency.next_step().unwrap().node, 1);
+    residency.broken(1);
+    assert_eq!(residency.state(1), NodeState::Broken);
+    check(&residency, &tree, &sizes(7), 1 << 20);
+    let (loaded, _) = settle(&mut residency, &[(0, 9.0), (1, 3.0), (4, 2.0), (2, 8.0)]);
+    assert_eq!(loaded, [4]);
+}
+
+#[test]
+fn a_cap_below_the_roots_is_refused_with_what_they_need() {
+    let tree = tree(vec![leaf(), leaf(), leaf()]);
+    let needed = 3 * HELD + FILE;
+    assert!(Residency::new(&tree, sizes(3), options(needed)).is_ok());
+    let error = Residency::new(&tree, sizes(3), options(needed - 1)).unwrap_err().to_string();
+    assert!(error.contains(&format!("at least {needed} bytes")), "{error}");
+    assert!(error.contains(&format!("found {}", needed - 1)), "{error}");
+}
+
+#[test]
+fn a_shared_picture_is_held_once_and_leaves_with_its_last_user() {
+    let tree = two_levels();
+    let mut sizes = sizes(7);
+    sizes.textures = vec![TextureSize { file_bytes: 10, held_bytes: 70 }];
+    sizes.nodes[1].textures = vec![0];
+    sizes.nodes[4].textures = vec![0];
+    let cap = 3 * HELD + 70 + FILE;
+    let mut residency = started(&tree, sizes.clone(), options(cap));
+    residency.set_priorities(&[(0, 9.0), (1, 3.0), (4, 2.0)], &[]);
+    load_all(&mut residency);
+    residency.begin_frame();
+    // The second user finds the picture in memory and reads its own file only.
+    assert_eq!(residency.counters().read_bytes, 3 * FILE + 10);
+    assert_eq!(residency.used_bytes(), 3 * HELD + 70);
+    check(&residency, &tree, &sizes, cap);
+    let gone = settle(&mut residency, &[(0, 9.0), (1, 3.0), (4, 0.1), (2, 2.0)]);
+    assert_eq!(gone, (vec![2], vec![4]));
+    assert!(residency.has_texture(0));
+    assert_eq!(residency.used_bytes(), 3 * HELD + 70);
+    check(&residency, &tree, &sizes, cap);
+}
+
+#[test]
+fn uploads_of_a_frame_are_bounded_but_one_always_comes() {
+    let tree = tree(vec![sketch([0.0; 3], 1.0, (0..5).map(|_| leaf()).collect())]);
+    let bounded = ResidencyOptions { upload_bytes: 2 * HELD, ..options(1 << 20) };
+    let mut residency = started(&tree, sizes(6), bounded);
+    residency.set_priorities(&[(0, 9.0), (1, 5.0), (2, 4.0), (3, 3.0), (4, 2.0), (5, 1.0)], &[]);
+    load_all(&mut residency);
+    let arrived: Vec<_> = (0..4).map(|_| residency.begin_frame().arrived).collect();
+    assert_eq!(arrived, [vec![1, 2], vec![3, 4], vec![5], vec![]]);
+    let tiny = ResidencyOptions { upload_bytes: 1, ..options(1 << 20) };
+    let mut residency = started(&tree, sizes(6), tiny);
+    residency.set_priorities(&[(0, 9.0), (1, 5.0), (2, 4.0)], &[]);
+    load_all(&mut residency);
+    assert_eq!(residency.begin_frame().arrived, [1]);
+}
+
+#[test]
+fn nodes_in_memory_that_nobody_visits_come_up_in_turn() {
+    let tree = two_levels();
+    let mut residency = started(&tree, sizes(7), options(1 << 20));
+    let all = [(0, 9.0), (1, 8.0), (4, 7.0), (2, 6.0), (3, 5.0), (5, 4.0), (6, 3.0)];
+    settle(&mut residency, &all);
+    residency.set_priorities(&[(0, 9.0), (1, 8.0), (4, 7.0)], &[]);
+    let mut seen = std::collections::BTreeSet::new();
+    let mut stale = Vec::new();
+    for _ in 0..4 {
+        residency.stale(1, &mut stale);
+        assert!(stale.len() <= 1);
+        seen.extend(stale.iter().copied());
+    }
+    assert_eq!(seen.into_iter().collect::<Vec<_>>(), [2, 3, 5, 6]);
+}
+
+/// Random priorities, portions, failures and frames: every promise at every step.
+#[test]
+fn promises_hold_whatever_happens() {
+    let mut state = 7u64;
+    let mut random = move |below: u64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 33) % below
+    };
+    for round in 0..60 {
+        let mut deep = || {
+            let pair = |n: u64| sketch([0.0; 3], 1.0, (0..n).map(|_| leaf()).collect());
+            let children = (0..1 + random(3)).map(|_| pair(random(4))).collect();
+            sketch([0.0; 3], 1.0, children)
+        };
+        let tree = tree(vec![deep(), deep()]);
+        let mut sizes = Sizes {
+            nodes: (0..tree.len())
+                .map(|_| NodeSize {
+                    file_bytes: 1 + random(900),
+                    held_bytes: 1 + random(700),
+                    textures: (0..random(3)).map(|texture| texture as u32).collect(),
+                })
+                .collect(),
+            textures: vec![
+                TextureSize { file_bytes: 300, held_bytes: 200 },
+                TextureSize { file_bytes: 100, held_bytes: 400 },
+            ],
+        };
+        sizes.nodes.iter_mut().for_each(|size| size.textures.dedup());
+        let cap = 3000 + 400 * (round % 7);
+        let Ok(_) = Residency::new(&tree, sizes.clone(), options(cap)) else { continue };
+        let mut residency = started(&tree, sizes.clone(), options(cap));
+        for _ in 0..300 {
+            match random(4) {
+                0 => {
+                    let changes = residency.begin_frame();
+                    for &node in &changes.left {
+                        assert_eq!(residency.state(node), NodeState::Absent);
+                    }
+                    let visited: Vec<(u32, f64)> = (0..tree.len() as u32)
+                        .filter_map(|node| (random(4) > 0).then(|| (node, random(1000) as f64)))
+                        .collect();
+                    residency.set_priorities(&visited, &[]);
+                }
+                _ => {
+                    if let Some(step) = residency.next_step() {
+                        check(&residency, &tree, &sizes, cap);
+                        if residency.portion_read(step.node, step.bytes) {
+                            match random(12) {
+                                0 => residency.broken(step.node),
+                                _ => residency.loaded(step.node),
+                            }
+                        }
+                    }
+                }
+            }
+            check(&residency, &tree, &sizes, cap);
+            for &root in tree.roots() {
+                assert_eq!(residency.state(root), NodeState::Resident);
+            }
+        }
+    }
+}
