@@ -5,6 +5,7 @@
 //! Source coordinates are f64 until a block gives them an f64 origin and f32 offsets.
 //! The library neither prints nor exits nor panics on input; only the programs do.
 
+pub mod bench;
 pub mod build;
 pub mod camera;
 pub mod city;

@@ -1,9 +1,45 @@
 //! The two feedback loops (thesis, section 4.2, "Time slicing" and "Feedback loop").
 
-use super::LakhiaOptions;
+use super::{LakhiaOptions, ShareFeedback};
 
 /// `shareTime` stays within these multiples of the time that the target leaves for nodes.
 const SHARE_RANGE: [f64; 2] = [0.01, 1000.0];
+
+/// Siblings whose share exceeds or misses what they need by this part are on their way up or down.
+const ON_THE_WAY: f64 = 0.1;
+
+/// What a frame's siblings would do to the time of later frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Outlook {
+    /// Milliseconds that the cheapest of the siblings refused by their counters would add;
+    /// infinite where none was.
+    pub refused_ms: f64,
+    /// The same of those whose counters are on their way up.
+    pub rising_ms: f64,
+    /// Siblings are drawn whose counters are on their way down.
+    pub falling: bool,
+}
+
+impl Outlook {
+    /// Before any siblings were visited.
+    pub const NONE: Self =
+        Self { refused_ms: f64::INFINITY, rising_ms: f64::INFINITY, falling: false };
+
+    /// Siblings in memory were refused that would add `more_ms`; `plenty` is the part by which
+    /// their share exceeds what they need.
+    pub fn refused(&mut self, more_ms: f64, plenty: f64) {
+        let more_ms = more_ms.max(0.0);
+        self.refused_ms = self.refused_ms.min(more_ms);
+        if plenty > ON_THE_WAY {
+            self.rising_ms = self.rising_ms.min(more_ms);
+        }
+    }
+
+    /// Siblings were drawn or passed.
+    pub fn accepted(&mut self, plenty: f64) {
+        self.falling |= plenty < -ON_THE_WAY;
+    }
+}
 
 /// What the feedback loops adjust.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,9 +55,14 @@ impl Feedback {
         Self { v_time: options.time.ms_per_cost, share_ms: for_nodes(options) }
     }
 
-    /// After a frame whose nodes cost `cost`. `refused` says that nodes in memory were kept back
-    /// because their cumulative hysteresis was below 0.
-    pub fn adjust(&mut self, options: &LakhiaOptions, cost: f64, refused: bool, actual_ms: f64) {
+    /// After a frame whose nodes cost `cost`.
+    pub fn adjust(
+        &mut self,
+        options: &LakhiaOptions,
+        cost: f64,
+        outlook: &Outlook,
+        actual_ms: f64,
+    ) {
         // The first loop: v_time follows what the frame's nodes took.
         let observed = (actual_ms - options.time.fixed_ms) / cost;
         if cost > 0.0 && observed.is_finite() {
@@ -31,9 +72,18 @@ impl Feedback {
         }
         // The second: time that is left goes to nodes that could use it.
         let slack = options.share_slack * options.target_ms;
-        if refused && actual_ms < options.target_ms - slack {
+        let left_ms = options.target_ms - actual_ms;
+        let refused = outlook.refused_ms.is_finite();
+        let (more, less) = match options.share_feedback {
+            ShareFeedback::Plain => (refused && left_ms > slack, left_ms < -slack),
+            ShareFeedback::Damped => (
+                outlook.refused_ms <= left_ms && outlook.rising_ms > left_ms,
+                left_ms < -slack && !outlook.falling,
+            ),
+        };
+        if more {
             self.share_ms *= 1.0 + options.share_gain;
-        } else if actual_ms > options.target_ms + slack {
+        } else if less {
             self.share_ms *= 1.0 - options.share_gain;
         }
         let [least, most] = SHARE_RANGE.map(|factor| factor * for_nodes(options));
@@ -56,49 +106,68 @@ mod tests {
         LakhiaOptions { time, ..LakhiaOptions::default() }
     }
 
+    const CALM: Outlook = Outlook::NONE;
+    const REFUSED: Outlook = Outlook { refused_ms: 2.0, ..Outlook::NONE };
+
     #[test]
     fn v_time_comes_to_what_is_observed() {
         let (options, mut feedback) = (options(), Feedback::new(&options()));
         for _ in 0..200 {
-            feedback.adjust(&options, 100.0, false, 10.0 + 100.0 * 0.2);
+            feedback.adjust(&options, 100.0, &CALM, 10.0 + 100.0 * 0.2);
         }
         assert!((feedback.v_time - 0.2).abs() < 1e-6, "{}", feedback.v_time);
         // One frame moves it by the gain, no more.
-        feedback.adjust(&options, 100.0, false, 10.0 + 100.0 * 1.2);
+        feedback.adjust(&options, 100.0, &CALM, 10.0 + 100.0 * 1.2);
         assert!((feedback.v_time - 0.3).abs() < 1e-6, "{}", feedback.v_time);
     }
 
-    #[test]
-    fn the_share_grows_only_where_something_was_refused() {
-        let (options, mut feedback) = (options(), Feedback::new(&options()));
+    /// `shareTime` after a frame, from 20.
+    fn share(share_feedback: ShareFeedback, outlook: Outlook, actual_ms: f64) -> f64 {
+        let options = LakhiaOptions { share_feedback, ..options() };
+        let mut feedback = Feedback::new(&options);
         assert_eq!(feedback.share_ms, 20.0);
-        feedback.adjust(&options, 100.0, false, 12.0);
-        assert_eq!(feedback.share_ms, 20.0);
-        feedback.adjust(&options, 100.0, true, 12.0);
-        assert!((feedback.share_ms - 20.2).abs() < 1e-12);
-        feedback.adjust(&options, 100.0, true, 29.9);
-        assert!((feedback.share_ms - 20.2).abs() < 1e-12, "not substantially below the target");
+        feedback.adjust(&options, 100.0, &outlook, actual_ms);
+        feedback.share_ms
     }
 
     #[test]
-    fn the_share_shrinks_where_the_target_is_exceeded() {
-        let (options, mut feedback) = (options(), Feedback::new(&options()));
-        feedback.adjust(&options, 100.0, false, 31.0);
-        assert_eq!(feedback.share_ms, 20.0, "not substantially above the target");
-        feedback.adjust(&options, 100.0, false, 40.0);
-        assert!((feedback.share_ms - 19.8).abs() < 1e-12);
+    fn the_plain_share_follows_the_thesis() {
+        use ShareFeedback::Plain;
+        assert_eq!(share(Plain, CALM, 12.0), 20.0, "nothing was refused");
+        assert_eq!(share(Plain, REFUSED, 12.0), 20.2);
+        assert_eq!(share(Plain, REFUSED, 29.9), 20.0, "not substantially below the target");
+        assert_eq!(share(Plain, CALM, 31.0), 20.0, "not substantially above the target");
+        assert_eq!(share(Plain, CALM, 40.0), 19.8);
+    }
+
+    #[test]
+    fn the_damped_share_waits_for_what_is_on_its_way() {
+        use ShareFeedback::Damped;
+        assert_eq!(share(Damped, CALM, 12.0), 20.0, "nothing was refused");
+        assert_eq!(share(Damped, REFUSED, 27.9), 20.2);
+        assert_eq!(share(Damped, REFUSED, 28.1), 20.0, "it would not fit");
+        let rising = Outlook { rising_ms: 2.0, ..REFUSED };
+        assert_eq!(share(Damped, rising, 20.0), 20.0, "it is on its way up");
+        let too_much = Outlook { rising_ms: 15.0, ..REFUSED };
+        assert_eq!(share(Damped, too_much, 20.0), 20.2, "what rises is not what would fit");
+        assert_eq!(share(Damped, CALM, 40.0), 19.8);
+        let falling = Outlook { falling: true, ..CALM };
+        assert_eq!(share(Damped, falling, 40.0), 20.0, "it is on its way down");
     }
 
     #[test]
     fn odd_frames_leave_sound_figures() {
-        let (options, mut feedback) = (options(), Feedback::new(&options()));
-        for actual in [0.0, 1e9, 5.0, f64::INFINITY, f64::NAN] {
-            for cost in [0.0, 1e-300, 1e9] {
-                for _ in 0..2000 {
-                    feedback.adjust(&options, cost, true, actual);
+        for share_feedback in [ShareFeedback::Plain, ShareFeedback::Damped] {
+            let options = LakhiaOptions { share_feedback, ..options() };
+            let mut feedback = Feedback::new(&options);
+            for actual in [0.0, 1e9, 5.0, f64::INFINITY, f64::NAN] {
+                for cost in [0.0, 1e-300, 1e9] {
+                    for _ in 0..2000 {
+                        feedback.adjust(&options, cost, &REFUSED, actual);
+                    }
+                    assert!(feedback.v_time.is_finite() && feedback.v_time > 0.0);
+                    assert!(feedback.share_ms.is_finite() && feedback.share_ms > 0.0);
                 }
-                assert!(feedback.v_time.is_finite() && feedback.v_time > 0.0);
-                assert!(feedback.share_ms.is_finite() && feedback.share_ms > 0.0);
             }
         }
     }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::LakhiaOptions;
 use super::benefit::{Seen, seen};
-use super::feedback::Feedback;
+use super::feedback::{Feedback, Outlook};
 use super::hysteresis::Hysteresis;
 use crate::camera::View;
 use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection};
@@ -17,8 +17,8 @@ pub struct Lakhia {
     hysteresis: Hysteresis,
     /// Cost of the front that was chosen last.
     cost: f64,
-    /// Whether nodes in memory were kept back in it by their counters.
-    refused: bool,
+    /// What its siblings would do to later frames.
+    outlook: Outlook,
     queue: VecDeque<Siblings>,
     /// The siblings at hand.
     seen: Vec<Seen>,
@@ -41,7 +41,7 @@ impl Lakhia {
             options,
             hysteresis: Hysteresis::default(),
             cost: 0.0,
-            refused: false,
+            outlook: Outlook::NONE,
             queue: VecDeque::new(),
             seen: Vec::new(),
         }
@@ -70,7 +70,7 @@ impl Lakhia {
             }
             self.seen.push(seen);
         }
-        let allowed = self.update_counters(tree, members, siblings.share_ms, sum);
+        let (allowed, needed_ms) = self.update_counters(tree, members, siblings.share_ms, sum);
         let resident = || {
             members.iter().zip(&self.seen).all(|(&node, seen)| {
                 residents.contains(node) || !(seen.visible || self.options.all_siblings)
@@ -79,19 +79,23 @@ impl Lakhia {
         if let Some(parent) = siblings.parent {
             let resident = resident();
             if !(allowed && resident) {
-                self.refused |= resident;
+                if resident {
+                    let more_ms = needed_ms - self.feedback.v_time * tree.node(parent).cost;
+                    self.outlook.refused(more_ms, siblings.share_ms / needed_ms - 1.0);
+                }
                 self.draw(tree, parent, out);
                 return;
             }
-        } else {
-            self.refused |= !allowed;
+            self.outlook.accepted(siblings.share_ms / needed_ms - 1.0);
         }
+        // Roots have no parent that could stand for them: far ones that need more than their
+        // share do not keep the near ones from going on.
         let visible_count = self.seen.iter().filter(|seen| seen.visible).count();
         for (&node, seen) in members.iter().zip(&self.seen) {
             if !seen.visible || !(siblings.parent.is_some() || residents.contains(node)) {
                 continue;
             }
-            if allowed && !tree.children(node).is_empty() {
+            if !tree.children(node).is_empty() {
                 let share_ms = siblings.share_ms * share(seen.priority, sum, visible_count);
                 self.queue.push_back(Siblings { parent: Some(node), share_ms });
             } else {
@@ -101,19 +105,21 @@ impl Lakhia {
         }
     }
 
-    /// Time slices (eq. 4.1) against the time needed; true where `cumHyst` is not below 0.
+    /// Time slices (eq. 4.1) against the time needed: whether `cumHyst` is not below 0, and the
+    /// milliseconds that all siblings in view need.
     fn update_counters(
         &mut self,
         tree: &SceneTree,
         members: &[u32],
         share_ms: f64,
         sum: f64,
-    ) -> bool {
+    ) -> (bool, f64) {
         let visible = || members.iter().zip(&self.seen).filter(|(_, seen)| seen.visible);
         let time_needed = |node: u32| self.feedback.v_time * tree.node(node).cost;
         let count = visible().count();
+        let needed_ms = visible().map(|(&node, _)| time_needed(node)).sum::<f64>();
         if visible().any(|(&node, _)| self.hysteresis.is_new(node)) {
-            let affordable = share_ms > visible().map(|(&node, _)| time_needed(node)).sum::<f64>();
+            let affordable = share_ms > needed_ms;
             for (&node, _) in members.iter().zip(&self.seen).filter(|(_, seen)| seen.visible) {
                 if self.hysteresis.is_new(node) {
                     self.hysteresis.start(node, affordable, &self.options);
@@ -127,7 +133,7 @@ impl Lakhia {
             self.hysteresis.update(node, time_slice, time_needed, self.options.hyst_limit);
             cumulative += self.hysteresis.truncated(node, self.options.hyst_switch);
         }
-        cumulative >= 0.0
+        (cumulative >= 0.0, needed_ms)
     }
 
     fn draw(&mut self, tree: &SceneTree, node: u32, out: &mut Selection) {
@@ -155,7 +161,7 @@ impl Policy for Lakhia {
     ) {
         out.clear();
         self.hysteresis.resize(tree.len());
-        (self.cost, self.refused) = (0.0, false);
+        (self.cost, self.outlook) = (0.0, Outlook::NONE);
         self.queue.clear();
         self.queue.push_back(Siblings { parent: None, share_ms: self.feedback.share_ms });
         // First in, first out: all siblings come before the children of any.
@@ -174,6 +180,6 @@ impl Policy for Lakhia {
     }
 
     fn drawn(&mut self, outcome: &FrameOutcome) {
-        self.feedback.adjust(&self.options, self.cost, self.refused, outcome.actual_ms);
+        self.feedback.adjust(&self.options, self.cost, &self.outlook, outcome.actual_ms);
     }
 }

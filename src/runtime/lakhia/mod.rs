@@ -10,4 +10,4 @@ mod options;
 mod tests;
 
 pub use front::Lakhia;
-pub use options::{LakhiaOptions, StartOfHysteresis, TimeModel};
+pub use options::{LakhiaOptions, ShareFeedback, StartOfHysteresis, TimeModel};

@@ -35,6 +35,8 @@ pub struct LakhiaOptions {
     /// The part of the target that a frame must miss it by before `shareTime` changes
     /// ("substantially", thesis section 4.2).
     pub share_slack: f64,
+    /// How the second feedback loop is kept from swinging.
+    pub share_feedback: ShareFeedback,
     /// What frames are expected to take before any was drawn.
     pub time: TimeModel,
 }
@@ -54,6 +56,7 @@ impl Default for LakhiaOptions {
             v_time_gain: 0.1,
             share_gain: 0.01,
             share_slack: 0.05,
+            share_feedback: ShareFeedback::Damped,
             time: TimeModel::default(),
         }
     }
@@ -69,6 +72,22 @@ pub enum StartOfHysteresis {
     /// At 0 where the siblings' share of time suffices for all of them (the thesis's rule without
     /// hysteresis), and otherwise twice `c_hystSwitch` below, so that they must earn their place.
     Affordable,
+}
+
+/// When the second feedback loop changes `shareTime`.
+///
+/// Counters answer a change after hundreds of frames. A loop that goes on changing `shareTime`
+/// all that time overshoots, and all nodes then switch together, up and down without end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum ShareFeedback {
+    /// As the thesis words it: up while nodes in memory are refused and frames are substantially
+    /// below the target, down while they are substantially above.
+    Plain,
+    /// Up only where what is refused would fit below the target, and not while counters are on
+    /// their way that will use the time; down not while counters are on their way that will
+    /// free it.
+    Damped,
 }
 
 /// How drawing time follows from what is drawn.

@@ -131,6 +131,17 @@ fn roots_in_view_are_always_drawn() {
 }
 
 #[test]
+fn many_far_roots_do_not_keep_a_near_one_coarse() {
+    let near = sketch([6.0, 0.0, 0.0], 1.0, vec![sketch([6.0, 0.0, 0.0], 2.0, vec![])]);
+    let far = (0..20).map(|_| sketch([500.0, 0.0, 0.0], 1.0, vec![]));
+    let tree = tree(std::iter::once(near).chain(far).collect());
+    let mut policy = Lakhia::new(options());
+    for _ in 0..50 {
+        assert!(front(&mut policy, &tree, &Residents::all(22)).contains(&1));
+    }
+}
+
+#[test]
 fn counters_delay_a_switch_by_their_urgency() {
     // 4.9 of 5 ms fit; then the time for a unit of cost doubles: urgency (5 − 9.8) / 9.8 = −0.49
     // a frame, so that −1 is reached in the third.
@@ -187,17 +198,23 @@ fn the_estimate_is_overhead_and_time_for_the_costs_drawn() {
 
 #[test]
 fn unused_time_goes_to_nodes_that_were_refused() {
-    let (tree, residents) = (fork(6.0), Residents::all(3));
-    let run = |share_gain: f64| {
-        let mut policy = Lakhia::new(LakhiaOptions { share_gain, ..options() });
+    // The near root gets four fifths of the time and needs a tenth; the far one's child costs 4.
+    let near = sketch([11.0, 0.0, 0.0], 1.0, vec![]);
+    let far = sketch([21.0, 0.0, 0.0], 1.0, vec![sketch([21.0, 0.0, 0.0], 4.0, vec![])]);
+    let (tree, residents) = (tree(vec![near, far]), Residents::all(3));
+    let run = |share_gain: f64, share_feedback| {
+        let options = LakhiaOptions { share_gain, share_feedback, ..options() };
+        let mut policy = Lakhia::new(options);
         for _ in 0..300 {
             let selection = select(&mut policy, &tree, &view(), &residents);
-            policy.drawn(&FrameOutcome { actual_ms: selection.estimated_ms.min(9.0) });
+            policy.drawn(&FrameOutcome { actual_ms: selection.estimated_ms });
         }
         front(&mut policy, &tree, &residents)
     };
-    assert_eq!(run(0.0), [0]);
-    assert_eq!(run(0.05), [1, 2]);
+    for feedback in [ShareFeedback::Plain, ShareFeedback::Damped] {
+        assert_eq!(run(0.0, feedback), [0, 1]);
+        assert_eq!(run(0.05, feedback), [0, 2]);
+    }
 }
 
 #[test]

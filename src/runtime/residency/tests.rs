@@ -307,7 +307,9 @@ fn promises_hold_whatever_happens() {
                         assert_eq!(residency.state(node), NodeState::Absent);
                     }
                     let visited: Vec<(u32, f64)> = (0..tree.len() as u32)
-                        .filter_map(|node| (random(4) > 0).then(|| (node, random(1000) as f64)))
+                        .map(|node| (node, random(4), random(1000) as f64))
+                        .filter(|&(_, skipped, _)| skipped > 0)
+                        .map(|(node, _, priority)| (node, priority))
                         .collect();
                     residency.set_priorities(&visited, &[]);
                 }

@@ -1,0 +1,20 @@
+//! Replays camera paths over a built scene and logs what a user would have felt.
+
+mod clock;
+mod model;
+mod options;
+mod record;
+mod replay;
+mod statistics;
+mod summary;
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub use clock::{CLOCK_FILE_VERSION, ClockConstants};
+pub use model::ModelWorld;
+pub use options::{BenchOptions, Pace, Size};
+pub use record::FrameRecord;
+pub use replay::{Drawn, Replay, Run, World, run};
+pub use summary::{Context, summary, summary_text};
+pub use write::write_run;

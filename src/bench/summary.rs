@@ -1,0 +1,251 @@
+//! The figures that the thesis reports (chapter 6), for one run.
+
+use std::fmt::Write;
+
+use serde_json::{Value, json};
+
+use super::statistics::{deviation, mean, percentile};
+use super::{BenchOptions, FrameRecord, Run};
+
+/// Above the target by more than this part counts as late.
+const LATE: f64 = 0.1;
+
+/// What a summary says of a run beside its frames.
+#[derive(Clone, Debug)]
+pub struct Context {
+    /// What determined the run.
+    pub options: BenchOptions,
+    /// Name of the policy.
+    pub policy: &'static str,
+    /// `wall` or `model`.
+    pub clock: &'static str,
+    /// The constants of the clock.
+    pub constants: super::ClockConstants,
+    /// BLAKE3 of scene, hexadecimal.
+    pub scene_fingerprint: String,
+    /// BLAKE3 of the path's poses and times, hexadecimal.
+    pub path_fingerprint: String,
+    /// The graphics adapter; `None` where nothing was drawn.
+    pub adapter: Option<Value>,
+    /// Files that could not be used, each with what was wrong.
+    pub broken: Vec<String>,
+    /// Number of levels of the scene.
+    pub levels: usize,
+}
+
+/// The summary of a run, as `summary.json` holds it.
+pub fn summary(run: &Run, context: &Context) -> Value {
+    let frames = &run.frames;
+    let target = context.options.selection.target_ms;
+    let of = |field: fn(&FrameRecord) -> f64| frames.iter().map(field).collect::<Vec<f64>>();
+    let times = of(|frame| frame.frame_ms);
+    let share = |holds: &dyn Fn(&f64) -> bool| {
+        mean(times.iter().map(|time| f64::from(u8::from(holds(time)))))
+    };
+    let over: Vec<f64> =
+        times.iter().filter(|&&time| time > target).map(|time| time - target).collect();
+    let toggles = |frames: &[FrameRecord]| {
+        let sum = |of: fn(&FrameRecord) -> u32| frames.iter().map(of).map(u64::from).sum::<u64>();
+        let (up, down) = (sum(|frame| frame.toggles_up), sum(|frame| frame.toggles_down));
+        let per_frame = (up + down) as f64 / (frames.len().max(1)) as f64;
+        (up, down, per_frame)
+    };
+    let (up, down, per_frame) = toggles(frames);
+    let (late_up, late_down, late_per_frame) = toggles(&frames[frames.len() / 2..]);
+    let cap = context.options.residency.max_memory_bytes;
+    let bytes = |of: fn(&FrameRecord) -> u64| frames.iter().map(of).sum::<u64>();
+    let levels = |level: usize| {
+        json!({
+            "nodes": mean(frames.iter().map(|frame| f64::from(frame.nodes_by_level[level]))),
+            "triangles": mean(frames.iter().map(|frame| frame.triangles_by_level[level] as f64)),
+        })
+    };
+    json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "scene_fingerprint": context.scene_fingerprint,
+        "path_fingerprint": context.path_fingerprint,
+        "policy": context.policy,
+        "clock": context.clock,
+        "parameters": context.options,
+        "clock_constants": context.constants,
+        "adapter": context.adapter,
+        "broken_files": context.broken,
+        "frames": frames.len(),
+        "frame_ms": {
+            "mean": mean(times.iter().copied()),
+            "sd": deviation(&times),
+            "p50": percentile(&times, 50.0),
+            "p95": percentile(&times, 95.0),
+            "p99": percentile(&times, 99.0),
+            "max": percentile(&times, 100.0),
+        },
+        "over_target_share": share(&|&time| time > target),
+        "late_share": share(&|&time| time > target * (1.0 + LATE)),
+        "over_target_ms": { "mean": mean(over.iter().copied()), "max": percentile(&over, 100.0) },
+        "utilisation": mean(of(|frame| frame.actual_ms)) / target,
+        "estimate_error_percent": error(frames, |frame| frame.estimated_ms),
+        "without_feedback": {
+            "estimate_error_percent":
+                error(frames, |frame| frame.estimated_without_feedback_ms),
+        },
+        "toggles": {
+            "up": up,
+            "down": down,
+            "per_frame": per_frame,
+            "frames_per_toggle": frames_per_toggle(frames.len(), up + down),
+            "longest_run": longest_run(frames),
+            "longest_pause": longest_pause(frames),
+            "second_half": { "up": late_up, "down": late_down, "per_frame": late_per_frame },
+        },
+        "memory": {
+            "cap_bytes": cap,
+            "start_bytes": run.start_bytes,
+            "peak_bytes": run.peak_bytes,
+            "peak_share": run.peak_bytes as f64 / cap as f64,
+            "mean_bytes": mean(of(|frame| frame.memory_bytes as f64)),
+            "process_peak_bytes": frames.iter().map(|frame| frame.process_bytes).max(),
+        },
+        "loading": {
+            "read_bytes": bytes(|frame| frame.read_bytes),
+            "arrived": bytes(|frame| u64::from(frame.arrived)),
+            "evictions": bytes(|frame| frame.evictions),
+            "waiting_mean": mean(of(|frame| f64::from(frame.waiting))),
+            "waiting_last": frames.last().map(|frame| frame.waiting),
+        },
+        "select_ms": {
+            "mean": mean(of(|frame| frame.select_ms)),
+            "max": percentile(&of(|frame| frame.select_ms), 100.0),
+        },
+        "visited_mean": mean(of(|frame| f64::from(frame.visited))),
+        "nodes_mean": mean(of(|frame| f64::from(frame.nodes))),
+        "triangles_mean": mean(of(|frame| frame.triangles as f64)),
+        "levels": (0..context.levels).map(levels).collect::<Vec<_>>(),
+    })
+}
+
+/// `(actual − estimated) / estimated` in percent: below 0 where estimates were cautious, as in
+/// the thesis (section 6.3).
+fn error(frames: &[FrameRecord], estimate: fn(&FrameRecord) -> f64) -> Value {
+    let errors: Vec<f64> = frames
+        .iter()
+        .filter(|frame| estimate(frame) > 0.0)
+        .map(|frame| (frame.actual_ms / estimate(frame) - 1.0) * 100.0)
+        .collect();
+    json!({ "mean": mean(errors.iter().copied()), "sd": deviation(&errors) })
+}
+
+fn frames_per_toggle(frames: usize, toggles: u64) -> Option<f64> {
+    (toggles > 0).then(|| frames as f64 / toggles as f64)
+}
+
+/// The most frames in a row each of which toggled.
+fn longest_run(frames: &[FrameRecord]) -> usize {
+    longest(frames, |frame| frame.toggles() > 0)
+}
+
+/// The most frames in a row without any toggle.
+fn longest_pause(frames: &[FrameRecord]) -> usize {
+    longest(frames, |frame| frame.toggles() == 0)
+}
+
+fn longest(frames: &[FrameRecord], holds: fn(&FrameRecord) -> bool) -> usize {
+    frames
+        .chunk_by(|a, b| holds(a) == holds(b))
+        .filter(|run| holds(&run[0]))
+        .map(<[_]>::len)
+        .max()
+        .unwrap_or(0)
+}
+
+/// The summary for a person, on one screen.
+pub fn summary_text(summary: &Value) -> String {
+    let number = |path: &str| summary.pointer(path).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let mib = |path: &str| number(path) / f64::from(1 << 20);
+    let target = number("/parameters/selection/target_ms");
+    let mut out = String::new();
+    let mut line = |name: &str, text: String| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(out, "{name:<12}{text}");
+    };
+    line("frames", format!("{}, {} clock", number("/frames"), text(summary, "/clock")));
+    line(
+        "frame time",
+        format!(
+            "{:.1} ms mean, {:.1} p50, {:.1} p95, {:.1} p99 for a target of {target} ms",
+            number("/frame_ms/mean"),
+            number("/frame_ms/p50"),
+            number("/frame_ms/p95"),
+            number("/frame_ms/p99"),
+        ),
+    );
+    line(
+        "",
+        format!(
+            "{:.1} % of frames over the target, {:.1} % by more than a tenth; {:.0} % used",
+            number("/over_target_share") * 100.0,
+            number("/late_share") * 100.0,
+            number("/utilisation") * 100.0
+        ),
+    );
+    line(
+        "estimate",
+        format!(
+            "{:+.2} % off on average, deviation {:.2} % (without feedback {:+.2} %, {:.2} %)",
+            number("/estimate_error_percent/mean"),
+            number("/estimate_error_percent/sd"),
+            number("/without_feedback/estimate_error_percent/mean"),
+            number("/without_feedback/estimate_error_percent/sd"),
+        ),
+    );
+    let toggles = number("/toggles/up") + number("/toggles/down");
+    line(
+        "toggles",
+        match number("/toggles/frames_per_toggle") {
+            frames if frames.is_nan() => "none".into(),
+            frames => format!(
+                "{toggles}: {} up, {} down, one in {frames:.1} frames",
+                number("/toggles/up"),
+                number("/toggles/down")
+            ),
+        },
+    );
+    line(
+        "drawn",
+        format!(
+            "{:.0} nodes and {:.0} triangles a frame; {:.0} nodes visited in {:.3} ms",
+            number("/nodes_mean"),
+            number("/triangles_mean"),
+            number("/visited_mean"),
+            number("/select_ms/mean")
+        ),
+    );
+    line(
+        "memory",
+        format!(
+            "{:.1} MiB at first, {:.1} at most, {:.1} % of the cap of {:.1}",
+            mib("/memory/start_bytes"),
+            mib("/memory/peak_bytes"),
+            number("/memory/peak_share") * 100.0,
+            mib("/memory/cap_bytes")
+        ),
+    );
+    line(
+        "loading",
+        format!(
+            "{:.1} MiB read, {} nodes arrived, {} made room, {} still wanted at the end",
+            mib("/loading/read_bytes"),
+            number("/loading/arrived"),
+            number("/loading/evictions"),
+            number("/loading/waiting_last")
+        ),
+    );
+    let broken = summary.pointer("/broken_files").and_then(Value::as_array);
+    for file in broken.into_iter().flatten() {
+        line("unusable", file.as_str().unwrap_or_default().to_owned());
+    }
+    out
+}
+
+fn text<'a>(summary: &'a Value, path: &str) -> &'a str {
+    summary.pointer(path).and_then(Value::as_str).unwrap_or("?")
+}

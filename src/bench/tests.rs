@@ -1,0 +1,198 @@
+//! Runs with the model clock over small scenes.
+
+use std::sync::{Arc, Mutex};
+
+use glam::DVec3;
+
+use super::write::frames_csv;
+use super::*;
+use crate::camera::{CameraPath, PathFrame, Pose, from_angles};
+use crate::format::Scene;
+use crate::mesh::UpAxis;
+use crate::runtime::SceneTree;
+use crate::runtime::lakhia::{Lakhia, TimeModel};
+use crate::runtime::residency::{Residency, ResidencyOptions, Sizes};
+use crate::runtime::test_tree::{Sketch, scene, sketch};
+
+/// A street of houses along x, each of three levels with two children a node.
+fn street(houses: usize) -> Scene {
+    fn node(at: [f64; 3], size: f64, depth: u32) -> Sketch {
+        let children = match depth {
+            0 => vec![],
+            _ => [-1.0, 1.0]
+                .map(|side| node([at[0] + side * size / 4.0, at[1], at[2]], size / 2.0, depth - 1))
+                .into(),
+        };
+        Sketch { size, benefit: size, ..sketch(at, 100.0, children) }
+    }
+    scene((0..houses).map(|house| node([house as f64 * 20.0, 15.0, 0.0], 16.0, 2)).collect())
+}
+
+/// Along the street at 1.5 m/s and 30 frames a second, looking ahead and aside.
+fn walk(frames: usize) -> CameraPath {
+    let frames = (0..frames)
+        .map(|frame| PathFrame {
+            frame: frame as u64,
+            time_s: frame as f64 / 30.0,
+            pose: Pose {
+                position: DVec3::new(frame as f64 * 0.05, 0.0, 0.0),
+                rotation: from_angles(UpAxis::Z, 30.0, 0.0, 0.0),
+                fov_y_deg: 60.0,
+            },
+        })
+        .collect();
+    CameraPath { frames }
+}
+
+fn options(max_memory_bytes: u64) -> BenchOptions {
+    let mut options = BenchOptions::default();
+    options.selection.target_ms = 3.0;
+    options.selection.time = TimeModel { fixed_ms: 0.5, ms_per_cost: 0.001 };
+    options.residency = ResidencyOptions { max_memory_bytes, ..ResidencyOptions::default() };
+    options
+}
+
+fn constants() -> ClockConstants {
+    ClockConstants {
+        fixed_ms: 0.5,
+        ms_per_cost: 0.001,
+        ms_per_node: 0.0,
+        load_bytes_per_ms: 50.0,
+        ..ClockConstants::default()
+    }
+}
+
+fn replay(scene: &Scene, path: &CameraPath, options: BenchOptions) -> Run {
+    let tree = SceneTree::new(scene);
+    let sizes = Sizes::new(scene, |vertices, _, _| u64::from(vertices) * 20, |_| 0);
+    let residency = Residency::new(&tree, sizes, options.residency).unwrap();
+    let mut policy = Lakhia::new(options.selection);
+    let mut world = ModelWorld::new(&tree, constants());
+    let replay = Replay {
+        tree: &tree,
+        path,
+        policy: &mut policy,
+        residency: Arc::new(Mutex::new(residency)),
+        world: &mut world,
+        options,
+        levels: scene.level_count(),
+    };
+    run(replay, |_| true).unwrap()
+}
+
+#[test]
+fn the_same_run_gives_the_same_bytes() {
+    let (scene, path) = (street(20), walk(200));
+    let [first, second] =
+        [(); 2].map(|()| frames_csv(&replay(&scene, &path, options(1 << 20)), 3).unwrap());
+    assert!(first == second);
+    assert_eq!(first.iter().filter(|&&byte| byte == b'\n').count(), 201);
+}
+
+#[test]
+fn a_walk_starts_with_the_roots_and_gets_finer_as_nodes_arrive() {
+    let run = replay(&street(20), &walk(300), options(1 << 20));
+    let first = &run.frames[0];
+    assert_eq!(first.nodes_by_level[1..], [0, 0]);
+    assert_eq!(first.resident, 20);
+    assert_eq!(run.start_bytes, 20 * 200);
+    let last = run.frames.last().unwrap();
+    assert!(last.nodes_by_level[2] > 0, "{last:?}");
+    assert!(run.frames.iter().map(|frame| frame.toggles_up).sum::<u32>() > 0);
+    // What is drawn is what the levels say, and time follows from cost.
+    for frame in &run.frames {
+        assert_eq!(frame.nodes, frame.nodes_by_level.iter().sum::<u32>());
+        assert_eq!(frame.triangles, 10 * u64::from(frame.nodes));
+        assert!((frame.actual_ms - (0.5 + 0.1 * f64::from(frame.nodes))).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn loading_reads_no_faster_than_the_clock_allows() {
+    let run = replay(&street(20), &walk(300), options(1 << 20));
+    let mut seconds = 0.0;
+    let mut bytes = 0;
+    for frame in &run.frames {
+        bytes += frame.read_bytes;
+        // A portion that was begun is finished.
+        assert!(bytes as f64 <= seconds * 50_000.0 + 50.0 * 34.0 + 1000.0);
+        seconds += 1.0 / 30.0;
+    }
+    assert!(bytes > 10_000);
+}
+
+#[test]
+fn a_still_camera_settles() {
+    let mut path = walk(1);
+    path.frames = (0..20000u64)
+        .map(|frame| PathFrame { frame, time_s: frame as f64 / 30.0, ..path.frames[0] })
+        .collect();
+    let run = replay(&street(20), &path, options(1 << 20));
+    let late: u32 = run.frames[1000..].iter().map(FrameRecord::toggles).sum();
+    assert_eq!(late, 0);
+}
+
+#[test]
+fn memory_stays_below_a_cap_of_a_few_nodes_and_is_used() {
+    let cap = 20 * 200 + 6 * 200 + 1000;
+    let run = replay(&street(20), &walk(600), options(cap));
+    assert!(run.peak_bytes <= cap);
+    assert!(run.frames.iter().all(|frame| frame.memory_bytes <= cap));
+    assert!(run.peak_bytes as f64 > 0.9 * cap as f64, "{} of {cap}", run.peak_bytes);
+    assert!(run.frames.iter().map(|frame| frame.evictions).sum::<u64>() > 0);
+}
+
+#[test]
+fn frames_of_settling_are_not_logged() {
+    let mut options = options(1 << 20);
+    options.settle_frames = 100;
+    let run = replay(&street(20), &walk(10), options);
+    assert_eq!(run.frames.len(), 10);
+    assert!(run.frames[0].nodes_by_level[1..].iter().sum::<u32>() > 0, "settled before");
+}
+
+#[test]
+fn a_summary_has_the_promised_keys_and_agrees_with_the_frames() {
+    let run = replay(&street(20), &walk(300), options(1 << 20));
+    let context = Context {
+        options: options(1 << 20),
+        policy: "lakhia",
+        clock: "model",
+        constants: constants(),
+        scene_fingerprint: "f".into(),
+        path_fingerprint: "p".into(),
+        adapter: None,
+        broken: Vec::new(),
+        levels: 3,
+    };
+    let summary = summary(&run, &context);
+    for key in [
+        "/frames",
+        "/toggles/up",
+        "/toggles/down",
+        "/toggles/per_frame",
+        "/frame_ms/mean",
+        "/frame_ms/p50",
+        "/frame_ms/p95",
+        "/frame_ms/p99",
+        "/over_target_share",
+        "/estimate_error_percent/mean",
+        "/estimate_error_percent/sd",
+        "/without_feedback/estimate_error_percent/mean",
+        "/without_feedback/estimate_error_percent/sd",
+        "/utilisation",
+        "/memory/cap_bytes",
+        "/memory/peak_bytes",
+        "/memory/peak_share",
+        "/select_ms/mean",
+    ] {
+        assert!(summary.pointer(key).is_some_and(serde_json::Value::is_number), "{key}");
+    }
+    assert_eq!(summary["frames"], 300);
+    let up: u32 = run.frames.iter().map(|frame| frame.toggles_up).sum();
+    assert_eq!(summary["toggles"]["up"], up);
+    // The model draws in the time that was estimated.
+    assert!(summary["estimate_error_percent"]["mean"].as_f64().unwrap().abs() < 1e-9);
+    let text = summary_text(&summary);
+    assert!(text.lines().count() < 24 && !text.contains("NaN"), "{text}");
+}
