@@ -13,6 +13,7 @@ pub mod error;
 pub mod format;
 pub mod import;
 pub mod mesh;
+mod random;
 pub mod report;
 pub mod runtime;
 pub mod texture;

@@ -3,7 +3,7 @@
 //! `x` runs along the façade from 0, `z` is the height above the ground. Geometry and texture are
 //! both drawn from this one description, so that painted windows lie where the recesses are.
 
-use super::random::{Random, hash, unit};
+use crate::random::{Random, hash, unit};
 
 /// A row of houses, one side of a city block.
 #[derive(Clone, Debug)]

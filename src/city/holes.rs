@@ -2,7 +2,7 @@
 
 use super::facade::Facade;
 use super::grid::Grid;
-use super::random::{Random, hash, unit};
+use crate::random::{Random, hash, unit};
 
 /// Share of the cells under the eaves that are missing.
 const RAGGED_SHARE: f64 = 0.2;

@@ -1,6 +1,6 @@
 //! Where each block stands: a grid of streets, four façade rows around each city block.
 
-use super::random::Random;
+use crate::random::Random;
 
 /// Depth of the houses behind their façade, metres.
 pub(super) const HOUSE_DEPTH: f64 = 12.0;

@@ -19,7 +19,6 @@ mod holes;
 mod layout;
 mod obj;
 mod options;
-mod random;
 mod sampling;
 mod scan;
 mod shell;
@@ -101,7 +100,7 @@ impl City {
             .into_iter()
             .zip(0..)
             .map(|(place, index)| {
-                let seed = random::hash(options.seed, index, 0xb10c);
+                let seed = crate::random::hash(options.seed, index, 0xb10c);
                 let facade = Facade::draw(seed, place.length);
                 Plan { place, facade, triangles: 0, seed }
             })

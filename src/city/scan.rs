@@ -4,8 +4,8 @@ use super::facade::{Facade, House};
 use super::grid::{Corner, Grid};
 use super::holes::Holes;
 use super::layout::{HALF_STREET, HOUSE_DEPTH, Place, turn};
-use super::random::{hash, mix};
 use super::sampling::Sampling;
+use crate::random::{hash, mix};
 
 /// Steps of the lattice that all coordinates lie on, to the metre: four decimals are exact.
 pub(super) const STEPS_PER_METRE: f64 = 10_000.0;

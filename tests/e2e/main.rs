@@ -10,5 +10,6 @@ mod determinism;
 mod golden;
 mod incremental;
 mod output;
+mod paths;
 mod real_data;
 mod soups;
