@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use rayon::prelude::*;
+
 use super::blocks::{BlockPlan, Division, plan};
 use super::cut::Piece;
 use super::disk_sink::{DiskSink, NodeRecord};
@@ -17,7 +19,7 @@ use super::stages::{Stage, Stages};
 use super::stray::set_strays_aside;
 use crate::Result;
 use crate::format::{BlockInfo, OutputDir};
-use crate::mesh::{Model, Part, UpAxis, Warnings};
+use crate::mesh::{Material, Model, Part, UpAxis, Warnings};
 use crate::texture::{
     BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan, texture_factors,
 };
@@ -114,7 +116,7 @@ pub fn build_input(
     fold_untextured(&mut model);
     let plans = plan(&model, options.blocks, options.hierarchy.desired_tris, up);
     let texture_plan = TexturePlan::new(&model);
-    let drafts = stages.time(Stage::Gather, || drafts(&mut model, plans, options));
+    let drafts = drafts(&mut model, plans, options, stages);
     let common = lattice_of(drafts.iter().filter(|draft| !draft.far));
     let shared_vertices = stages.time(Stage::Gather, || {
         let bounds: Vec<_> = drafts.iter().map(|draft| draft.source.bounds()).collect();
@@ -188,40 +190,62 @@ pub fn build_input(
 }
 
 /// Takes the parts out of the model and divides those blocks that are to be divided.
-fn drafts(model: &mut Model, plans: Vec<BlockPlan>, options: &BuildOptions) -> Vec<Draft> {
+fn drafts(
+    model: &mut Model,
+    plans: Vec<BlockPlan>,
+    options: &BuildOptions,
+    stages: &Stages,
+) -> Vec<Draft> {
     let mut parts: Vec<Option<Part>> =
         std::mem::take(&mut model.parts).into_iter().map(Some).collect();
-    let mut drafts = Vec::with_capacity(plans.len());
-    for BlockPlan { name, parts: numbers, divide: division } in plans {
-        let parts: Vec<Part> = numbers.iter().filter_map(|&number| parts[number].take()).collect();
-        let (parts, far) = set_strays_aside(&parts).unwrap_or((parts, Vec::new()));
-        if !far.is_empty() {
-            let name = format!("{name} (far off)");
-            let materials = materials_of(far.iter().map(|part| part.material).collect());
-            drafts.push(Draft { name, far: true, source: DraftSource::Parts(far), materials });
-        }
-        if division == Division::Whole {
-            let materials = materials_of(parts.iter().map(|part| part.material).collect());
-            drafts.push(Draft { name, far: false, source: DraftSource::Parts(parts), materials });
-            continue;
-        }
-        let piece = gather(&model.materials, &parts);
-        drop(parts);
-        let most = match division {
-            Division::Halves { most } => most,
-            Division::Whole | Division::Grid { .. } => piece.mesh.triangles.len(),
-        };
-        // The blocks' own factors are not known yet; those of the largest serve all.
-        let factors = simplifications(most.min(piece.mesh.triangles.len()), &options.hierarchy);
-        let shares: Vec<f64> = factors.iter().map(|factor| 1.0 / factor.sqrt()).collect();
-        let pieces = divide(piece, division, &shares);
-        let several = pieces.len() > 1;
-        for (number, piece) in pieces.into_iter().enumerate() {
-            let materials = materials_of(piece.mesh.materials.clone());
-            let name = if several { format!("{name} {}", number + 1) } else { name.clone() };
-            let source = DraftSource::Piece(Box::new(piece));
-            drafts.push(Draft { name, far: false, source, materials });
-        }
+    let planned: Vec<(BlockPlan, Vec<Part>)> = plans
+        .into_iter()
+        .map(|plan| {
+            let parts = plan.parts.iter().filter_map(|&number| parts[number].take()).collect();
+            (plan, parts)
+        })
+        .collect();
+    let drafts_of = |(plan, parts)| drafts_of_plan(&model.materials, plan, parts, options, stages);
+    let drafts: Vec<Vec<Draft>> = planned.into_par_iter().map(drafts_of).collect();
+    drafts.into_iter().flatten().collect()
+}
+
+fn drafts_of_plan(
+    materials: &[Material],
+    BlockPlan { name, divide: division, .. }: BlockPlan,
+    parts: Vec<Part>,
+    options: &BuildOptions,
+    stages: &Stages,
+) -> Vec<Draft> {
+    let mut drafts = Vec::new();
+    let stray = stages.time(Stage::Gather, || set_strays_aside(&parts));
+    let (parts, far) = stray.unwrap_or((parts, Vec::new()));
+    if !far.is_empty() {
+        let name = format!("{name} (far off)");
+        let materials = materials_of(far.iter().map(|part| part.material).collect());
+        drafts.push(Draft { name, far: true, source: DraftSource::Parts(far), materials });
+    }
+    if division == Division::Whole {
+        let materials = materials_of(parts.iter().map(|part| part.material).collect());
+        drafts.push(Draft { name, far: false, source: DraftSource::Parts(parts), materials });
+        return drafts;
+    }
+    let piece = stages.time(Stage::Gather, || gather(materials, &parts));
+    drop(parts);
+    let most = match division {
+        Division::Halves { most } => most,
+        Division::Whole | Division::Grid { .. } => piece.mesh.triangles.len(),
+    };
+    // The blocks' own factors are not known yet; those of the largest serve all.
+    let factors = simplifications(most.min(piece.mesh.triangles.len()), &options.hierarchy);
+    let shares: Vec<f64> = factors.iter().map(|factor| 1.0 / factor.sqrt()).collect();
+    let pieces = divide(piece, division, &shares, stages);
+    let several = pieces.len() > 1;
+    for (number, piece) in pieces.into_iter().enumerate() {
+        let materials = materials_of(piece.mesh.materials.clone());
+        let name = if several { format!("{name} {}", number + 1) } else { name.clone() };
+        let source = DraftSource::Piece(Box::new(piece));
+        drafts.push(Draft { name, far: false, source, materials });
     }
     drafts
 }

@@ -29,8 +29,12 @@ pub struct CutPlane<C: Coordinate = f32> {
     pub coordinate: C,
     /// The border edges as chains.
     pub chains: Vec<Chain<C>>,
-    /// Where each position stands: chain and index within it.
-    places: FxHashMap<PositionKey<C>, Vec<(u32, u32)>>,
+    /// A number for each position.
+    numbers: FxHashMap<PositionKey<C>, u32>,
+    /// Where the places of each numbered position begin in `places`, and where the last ones end.
+    first_place: Vec<u32>,
+    /// Where positions stand: chain and index within it.
+    places: Vec<(u32, u32)>,
 }
 
 /// A border vertex before ranking.
@@ -103,28 +107,56 @@ impl<C: Coordinate> CutPlane<C> {
 
     /// A plane whose chains are ranked already.
     pub fn from_chains(axis: usize, coordinate: C, chains: Vec<Chain<C>>) -> Self {
-        let mut places: FxHashMap<PositionKey<C>, Vec<(u32, u32)>> = FxHashMap::default();
-        for (number, chain) in chains.iter().enumerate() {
-            for (index, &position) in chain.positions.iter().enumerate() {
-                places.entry(key(position)).or_default().push((number as u32, index as u32));
+        let total = chains.iter().map(|chain| chain.positions.len()).sum();
+        let mut numbers: FxHashMap<PositionKey<C>, u32> = FxHashMap::default();
+        numbers.reserve(total);
+        let mut number_at: Vec<u32> = Vec::with_capacity(total);
+        // Counted one ahead of each position's own entry.
+        let mut first_place = vec![0];
+        for &position in chains.iter().flat_map(|chain| &chain.positions) {
+            let number = *numbers.entry(key(position)).or_insert_with(|| {
+                first_place.push(0);
+                first_place.len() as u32 - 2
+            });
+            first_place[number as usize + 1] += 1;
+            number_at.push(number);
+        }
+        for number in 1..first_place.len() {
+            first_place[number] += first_place[number - 1];
+        }
+        let mut next = first_place.clone();
+        let mut places = vec![(0, 0); total];
+        let mut number_at = number_at.into_iter();
+        for (chain, number_of_chain) in chains.iter().zip(0..) {
+            for (number, index) in number_at.by_ref().take(chain.positions.len()).zip(0..) {
+                let place = &mut next[number as usize];
+                places[*place as usize] = (number_of_chain, index);
+                *place += 1;
             }
         }
-        Self { axis, coordinate, chains, places }
+        Self { axis, coordinate, chains, numbers, first_place, places }
+    }
+
+    /// Where a position stands on this border.
+    fn places(&self, position: [C; 3]) -> Option<&[(u32, u32)]> {
+        let number = *self.numbers.get(&key(position))? as usize;
+        let [from, to] = [self.first_place[number], self.first_place[number + 1]];
+        Some(&self.places[from as usize..to as usize])
     }
 
     /// The coarsest level at which the border vertex at `position` is kept: the strictest of its
     /// places. `None` where the position is not on this border.
     pub fn keep_level(&self, position: [C; 3]) -> Option<u8> {
-        let places = self.places.get(&key(position))?;
+        let places = self.places(position)?;
         places.iter().map(|&(chain, at)| self.chains[chain as usize].keep[at as usize]).min()
     }
 
     /// The original polyline between two border vertices that are neighbours at `level`, ends
     /// included: the run whose inner vertices are all gone at that level.
-    pub fn run_between(&self, a: [C; 3], b: [C; 3], level: u8) -> Option<Vec<[C; 3]>> {
-        let from = self.places.get(&key(a))?;
-        let to = self.places.get(&key(b))?;
-        let mut best: Option<Vec<[C; 3]>> = None;
+    pub fn run_between(&self, a: [C; 3], b: [C; 3], level: u8) -> Option<&[[C; 3]]> {
+        let from = self.places(a)?;
+        let to = self.places(b)?;
+        let mut best: Option<&[[C; 3]]> = None;
         for &(chain_a, at_a) in from {
             for &(chain_b, at_b) in to {
                 if chain_a != chain_b || at_a == at_b {
@@ -132,10 +164,10 @@ impl<C: Coordinate> CutPlane<C> {
                 }
                 let chain = &self.chains[chain_a as usize];
                 let (low, high) = (at_a.min(at_b) as usize, at_a.max(at_b) as usize);
-                let inner_gone = chain.keep[low + 1..high].iter().all(|&keep| keep > level);
-                let shorter = best.as_ref().is_none_or(|best| high - low + 1 < best.len());
-                if inner_gone && shorter {
-                    best = Some(chain.positions[low..=high].to_vec());
+                let inner_gone = || chain.keep[low + 1..high].iter().all(|&keep| keep > level);
+                let shorter = best.is_none_or(|best| high - low + 1 < best.len());
+                if shorter && inner_gone() {
+                    best = Some(&chain.positions[low..=high]);
                 }
             }
         }

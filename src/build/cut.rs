@@ -17,6 +17,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::border::{Border, Path};
 use super::chain::{BorderVertex, CutPlane, KeepRule};
+use super::compact::renumber;
 use super::lattice::Lattice;
 use crate::mesh::{Coordinate, Mesh, PositionKey, key};
 
@@ -139,8 +140,8 @@ fn label<C: Coordinate>(mesh: &Mesh<C>, border: &Border, cut: &Cut<C>) -> Vec<i8
     let mut marked: FxHashSet<PositionKey<C>> = FxHashSet::default();
     let mut widest = 0.0f64;
     for &[a, b, c] in &mesh.triangles {
-        let corner_labels = [labels[a as usize], labels[b as usize], labels[c as usize]];
-        if !(corner_labels.contains(&BELOW) && corner_labels.contains(&ABOVE)) {
+        let [at_a, at_b, at_c] = [labels[a as usize], labels[b as usize], labels[c as usize]];
+        if !(at_a.min(at_b).min(at_c) == BELOW && at_a.max(at_b).max(at_c) == ABOVE) {
             continue;
         }
         for (from, to) in [(a, b), (b, c), (c, a)] {
@@ -197,11 +198,13 @@ fn split<C: Coordinate>(
     };
     let mut made: FxHashMap<(u32, u32), u32> = FxHashMap::default();
     for triangle in triangles {
-        let side = triangle.map(|vertex| labels[vertex as usize]);
-        let (has_below, has_above) = (side.contains(&BELOW), side.contains(&ABOVE));
+        let [a, b, c] = triangle;
+        let side = [labels[a as usize], labels[b as usize], labels[c as usize]];
+        let (low, high) = (side[0].min(side[1]).min(side[2]), side[0].max(side[1]).max(side[2]));
+        let (has_below, has_above) = (low == BELOW, high == ABOVE);
         match (has_below, has_above) {
-            (true, false) => halves.push_below(triangle, side.contains(&ON)),
-            (false, true) => halves.push_above(triangle, side.contains(&ON)),
+            (true, false) => halves.push_below(triangle, high == ON),
+            (false, true) => halves.push_above(triangle, low == ON),
             (false, false) => {
                 let sum: f64 =
                     triangle.iter().map(|&v| mesh.positions[v as usize][cut.axis].wide()).sum();
@@ -371,32 +374,24 @@ fn extract<C: Coordinate>(
     plane: &CutPlane<C>,
     bit: u32,
 ) -> (Mesh<C>, Border) {
-    const UNUSED: u32 = u32::MAX;
-    let mut new_index = vec![UNUSED; mesh.positions.len()];
-    let mut side = Mesh::<C>::default();
-    let mut side_border = Border::default();
-    side.triangles.reserve_exact(triangles.len());
-    for &triangle in triangles {
-        let corners = triangle.map(|vertex| {
-            let old = vertex as usize;
-            if new_index[old] == UNUSED {
-                new_index[old] = side.push_vertex_from(mesh, old);
-                let mut planes = border.planes[old];
-                let mut keep = border.keep[old];
-                let position = mesh.positions[old];
-                if labels[old] == ON && shared.contains(&key(position)) {
-                    if planes == 0 {
-                        // A vertex that touches the other side without an edge stays for ever.
-                        keep = plane.keep_level(position).unwrap_or(0);
-                    }
-                    planes |= 1 << bit;
+    let (triangles, used) = renumber(triangles, mesh.positions.len());
+    let mut side_border =
+        Border { planes: Vec::with_capacity(used.len()), keep: Vec::with_capacity(used.len()) };
+    for &vertex in &used {
+        let old = vertex as usize;
+        let (mut planes, mut keep) = (border.planes[old], border.keep[old]);
+        if labels[old] == ON {
+            let position = mesh.positions[old];
+            if shared.contains(&key(position)) {
+                if planes == 0 {
+                    // A vertex that touches the other side without an edge stays for ever.
+                    keep = plane.keep_level(position).unwrap_or(0);
                 }
-                side_border.planes.push(planes);
-                side_border.keep.push(keep);
+                planes |= 1 << bit;
             }
-            new_index[old]
-        });
-        side.triangles.push(corners);
+        }
+        side_border.planes.push(planes);
+        side_border.keep.push(keep);
     }
-    (side, side_border)
+    (mesh.with_vertices(&used, triangles), side_border)
 }

@@ -76,11 +76,19 @@ struct TriangleGrid {
     cells: [i32; 3],
     /// Where each cell's triangles begin in `members`.
     first: Vec<u32>,
-    members: Vec<[Vec3; 3]>,
+    /// Numbers of triangles, cell by cell.
+    members: Vec<u32>,
+    triangles: Vec<[Vec3; 3]>,
 }
 
 /// Cells for each triangle: more makes the search cheaper and the grid dearer.
-const CELLS_PER_TRIANGLE: f32 = 2.0;
+const CELLS_PER_TRIANGLE: f32 = 1.0;
+
+/// Most cells along an axis, so that a cell's place fits bytes.
+const MOST_CELLS: i32 = 256;
+
+/// Added to a number from 0 to 2^22 it leaves the nearest whole number in the lowest bits.
+const WHOLE: f32 = 8_388_608.0;
 
 impl TriangleGrid {
     fn new(mesh: &Mesh) -> Self {
@@ -88,31 +96,59 @@ impl TriangleGrid {
         let (low, high) = (Vec3::from(low), Vec3::from(high));
         let size = (high - low).max(Vec3::splat((high - low).max_element() * 1e-3 + 1e-20));
         let wanted = (mesh.triangles.len() as f32 * CELLS_PER_TRIANGLE).max(1.0);
-        let side = (size.x * size.y * size.z / wanted).cbrt().max(size.max_element() / 256.0);
-        let cells: [i32; 3] = (size / side).to_array().map(|n| (n.ceil() as i32).clamp(1, 256));
-        let mut grid =
-            Self { low, per_cell: 1.0 / side, cells, first: Vec::new(), members: Vec::new() };
-        let corners = |triangle: [u32; 3]| triangle.map(|v| Vec3::from(mesh.positions[v as usize]));
+        let most = MOST_CELLS as f32;
+        let side = (size.x * size.y * size.z / wanted).cbrt().max(size.max_element() / most);
+        let cells = (size / side).to_array().map(|n| (n.ceil() as i32).clamp(1, MOST_CELLS));
+        let triangles = mesh
+            .triangles
+            .iter()
+            .map(|&[a, b, c]| [a, b, c].map(|v| Vec3::from(mesh.positions[v as usize])))
+            .collect();
         let count = (cells[0] * cells[1] * cells[2]) as usize;
-        let mut first = vec![0u32; count + 1];
-        for &triangle in &mesh.triangles {
-            grid.for_cells_of(corners(triangle), |cell| first[cell + 1] += 1);
+        let (first, members) = (vec![0; count + 1], Vec::new());
+        let mut grid = Self { low, per_cell: 1.0 / side, cells, first, members, triangles };
+        grid.fill();
+        grid
+    }
+
+    /// Lists each triangle in the cells that its box touches.
+    fn fill(&mut self) {
+        let boxes: Vec<[[u8; 3]; 2]> = self
+            .triangles
+            .iter()
+            .map(|&[a, b, c]| {
+                [a.min(b).min(c), a.max(b).max(c)].map(|p| self.cell_at(p).map(|at| at as u8))
+            })
+            .collect();
+        let [width, depth, _] = self.cells.map(|count| count as usize);
+        let for_rows = |[from, to]: [[u8; 3]; 2], visit: &mut dyn FnMut(std::ops::Range<usize>)| {
+            for z in from[2]..=to[2] {
+                for y in from[1]..=to[1] {
+                    let row = (usize::from(z) * depth + usize::from(y)) * width;
+                    visit(row + usize::from(from[0])..row + usize::from(to[0]) + 1);
+                }
+            }
+        };
+        // Counted, summed up to where each cell ends, and filled from behind to where it begins.
+        let mut ends = std::mem::take(&mut self.first);
+        let mut total = 0;
+        for &cells in &boxes {
+            for_rows(cells, &mut |row| ends[row].iter_mut().for_each(|count| *count += 1));
         }
-        for cell in 0..count {
-            first[cell + 1] += first[cell];
+        for end in &mut ends {
+            total += *end;
+            *end = total;
         }
-        let mut fill = first.clone();
-        let mut members = vec![[Vec3::ZERO; 3]; first[count] as usize];
-        for &triangle in &mesh.triangles {
-            let corners = corners(triangle);
-            grid.for_cells_of(corners, |cell| {
-                members[fill[cell] as usize] = corners;
-                fill[cell] += 1;
+        self.members = vec![0; total as usize];
+        for (number, &cells) in boxes.iter().enumerate().rev() {
+            for_rows(cells, &mut |row| {
+                for end in &mut ends[row] {
+                    *end -= 1;
+                    self.members[*end as usize] = number as u32;
+                }
             });
         }
-        grid.first = first;
-        grid.members = members;
-        grid
+        self.first = ends;
     }
 
     /// The farthest of some of the points, or `least` where none is farther.
@@ -124,20 +160,15 @@ impl TriangleGrid {
             .fold(least, |worst, &point| worst.max(self.distance_beyond(point, worst)))
     }
 
+    /// The cell of a point, or the nearest to it. A point on a wall may count to either side.
+    #[inline]
     fn cell_at(&self, point: Vec3) -> [i32; 3] {
-        let at = ((point - self.low) * self.per_cell).to_array();
-        std::array::from_fn(|i| (at[i] as i32).clamp(0, self.cells[i] - 1))
-    }
-
-    fn for_cells_of(&self, [a, b, c]: [Vec3; 3], mut visit: impl FnMut(usize)) {
-        let (from, to) = (self.cell_at(a.min(b).min(c)), self.cell_at(a.max(b).max(c)));
-        for z in from[2]..=to[2] {
-            for y in from[1]..=to[1] {
-                for x in from[0]..=to[0] {
-                    visit(self.index([x, y, z]));
-                }
-            }
-        }
+        let at = ((point - self.low) * self.per_cell - 0.5).to_array();
+        let place = |i: usize| {
+            let inside = at[i].max(0.0).min((self.cells[i] - 1) as f32);
+            (inside + WHOLE).to_bits() as i32 & 0x3f_ffff
+        };
+        [place(0), place(1), place(2)]
     }
 
     fn index(&self, [x, y, z]: [i32; 3]) -> usize {
@@ -167,7 +198,11 @@ impl TriangleGrid {
             }
             self.for_ring(home, ring, |cell| {
                 let range = self.first[cell] as usize..self.first[cell + 1] as usize;
-                for &[a, b, c] in &self.members[range] {
+                for &triangle in &self.members[range] {
+                    if best <= enough_squared {
+                        return;
+                    }
+                    let [a, b, c] = self.triangles[triangle as usize];
                     best = best.min(squared_distance(point, a, b, c));
                 }
             });
@@ -199,6 +234,7 @@ impl TriangleGrid {
 
 /// Squared distance from a point to a triangle, by the region of the plane that its projection
 /// falls in (Ericson, Real-Time Collision Detection, section 5.1.5).
+#[inline]
 fn squared_distance(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> f32 {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));

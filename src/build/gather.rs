@@ -9,10 +9,11 @@ use super::border::{Border, Path};
 use super::chain::{Chain, CutPlane, KeepRule};
 use super::cut::{Cut, CutTolerance, Piece, cut};
 use super::lattice::Lattice;
-use crate::mesh::{Material, Mesh, Part, PositionKey, key};
+use super::stages::{Stage, Stages};
+use crate::mesh::{Material, Mesh, Part, PositionKey, color_key, key, texcoord_key};
 
 /// What makes two source vertices one.
-type VertexKey = (PositionKey<f64>, [u32; 2], [u16; 4], u32);
+type VertexKey = (PositionKey<f64>, u64, u64, u32);
 
 /// Joins parts into one piece; vertices that are equal in position, texture coordinate, colour
 /// and material become one.
@@ -35,7 +36,7 @@ pub fn gather(materials: &[Material], parts: &[Part]) -> Piece<f64> {
             let position = part.positions[vertex].map(|coordinate| coordinate + 0.0);
             let texcoord = if has_texcoords { part.texcoords[vertex] } else { [0.0; 2] };
             let color = part.colors.get(vertex).copied().unwrap_or([u16::MAX; 4]);
-            let same = (key(position), texcoord.map(|c| (c + 0.0).to_bits()), color, part.material);
+            let same = (key(position), texcoord_key(texcoord), color_key(color), part.material);
             *welded.entry(same).or_insert_with(|| {
                 mesh.positions.push(position);
                 if any_textured {
@@ -57,41 +58,26 @@ pub fn gather(materials: &[Material], parts: &[Part]) -> Piece<f64> {
 }
 
 /// Cuts a gathered piece into the blocks of a [`Division`], in a fixed order.
-pub fn divide(piece: Piece<f64>, division: Division, shares: &[f64]) -> Vec<Piece<f64>> {
+pub fn divide(
+    piece: Piece<f64>,
+    division: Division,
+    shares: &[f64],
+    stages: &Stages,
+) -> Vec<Piece<f64>> {
     let rule =
         KeepRule { shares: shares.to_vec(), most: Vec::new(), first_level: 0, collinear: 0.0 };
+    let mut done = Vec::new();
     match division {
-        Division::Whole => vec![piece],
-        Division::Halves { most } => {
-            let mut done = Vec::new();
-            let mut stack = vec![piece];
-            while let Some(piece) = stack.pop() {
-                let triangles = piece.mesh.triangles.len();
-                let Some((low, high)) = piece.mesh.bounds().filter(|_| triangles > most) else {
-                    done.push(piece);
-                    continue;
-                };
-                let side = |axis: usize| high[axis] - low[axis];
-                let axis =
-                    (1..3).fold(0, |best, axis| if side(axis) > side(best) { axis } else { best });
-                let middle = median_of_triangles(&piece.mesh, axis);
-                if !(middle > low[axis] && middle < high[axis]) || piece.path.len() >= 12 {
-                    done.push(piece);
-                    continue;
-                }
-                let (below, above) = cut_at(piece, axis, middle, &rule);
-                stack.extend([above, below].into_iter().filter(|p| !p.mesh.triangles.is_empty()));
-            }
-            done
-        }
+        Division::Whole => done.push(piece),
+        Division::Halves { most } => return halves(piece, most, &rule, stages),
         Division::Grid { metres, axes } => {
-            let mut done = Vec::new();
             let mut stack = vec![piece];
             while let Some(piece) = stack.pop() {
                 match grid_line(&piece.mesh, metres, axes).filter(|_| piece.path.len() < 40) {
                     None => done.push(piece),
                     Some((axis, line)) => {
-                        let (below, above) = cut_at(piece, axis, line, &rule);
+                        let (below, above) =
+                            stages.time(Stage::Gather, || cut_at(piece, axis, line, &rule));
                         if below.mesh.triangles.is_empty() || above.mesh.triangles.is_empty() {
                             // Everything was on one side but for a vertex within tolerance.
                             done.extend(
@@ -103,9 +89,31 @@ pub fn divide(piece: Piece<f64>, division: Division, shares: &[f64]) -> Vec<Piec
                     }
                 }
             }
-            done
         }
     }
+    done
+}
+
+/// Halves a piece across its longest side until no part of it has more than `most` triangles.
+fn halves(piece: Piece<f64>, most: usize, rule: &KeepRule, stages: &Stages) -> Vec<Piece<f64>> {
+    let triangles = piece.mesh.triangles.len();
+    if triangles == 0 {
+        return Vec::new();
+    }
+    let Some((low, high)) = piece.mesh.bounds().filter(|_| triangles > most) else {
+        return vec![piece];
+    };
+    let side = |axis: usize| high[axis] - low[axis];
+    let axis = (1..3).fold(0, |best, axis| if side(axis) > side(best) { axis } else { best });
+    let middle = stages.time(Stage::Gather, || median_of_triangles(&piece.mesh, axis));
+    if !(middle > low[axis] && middle < high[axis]) || piece.path.len() >= 12 {
+        return vec![piece];
+    }
+    let (below, above) = stages.time(Stage::Gather, || cut_at(piece, axis, middle, rule));
+    let (mut done, above) =
+        rayon::join(|| halves(below, most, rule, stages), || halves(above, most, rule, stages));
+    done.extend(above);
+    done
 }
 
 fn cut_at(piece: Piece<f64>, axis: usize, at: f64, rule: &KeepRule) -> (Piece<f64>, Piece<f64>) {

@@ -343,10 +343,9 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             };
             let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
             let HierarchyOptions { simplifier, weights, .. } = *self.options;
-            let before = border.clone();
-            let mut result = simplify(mesh, border, path, at, target, simplifier, weights);
+            let mut result = simplify(&mesh, &border, path, at, target, simplifier, weights);
             if result.mesh.triangles.is_empty() {
-                result = remnant(&source_mesh, &before, LEAST_TRIANGLES.min(target));
+                result = remnant(&source_mesh, &border, LEAST_TRIANGLES.min(target));
             }
             // Simplification renumbers vertices, and clustering may take a border edge away.
             let skirts = match with_skirts {

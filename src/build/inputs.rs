@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use super::stages::{Stage, Stages};
 use crate::report::build_report::{FileReport, InputReport};
 use crate::{Error, Result};
 
 /// Sizes and hashes of the files of an input.
-pub fn describe(dependencies: &[PathBuf]) -> Result<Vec<FileReport>> {
-    dependencies.par_iter().map(|path| describe_file(path)).collect()
+pub fn describe(dependencies: &[PathBuf], stages: &Stages) -> Result<Vec<FileReport>> {
+    let describe = |path: &PathBuf| stages.time(Stage::Compare, || describe_file(path));
+    dependencies.par_iter().map(describe).collect()
 }
 
 /// True where every file of an input is as it was.

@@ -3,10 +3,10 @@
 use rustc_hash::FxHashMap;
 
 use super::border::Border;
-use crate::mesh::{Mesh, PositionKey, key};
+use crate::mesh::{Mesh, PositionKey, color_key, key, texcoord_key};
 
 /// What makes two vertices one: position, texture coordinate, colour and material.
-type VertexKey = (PositionKey<f32>, [u32; 2], [u16; 4], u32);
+type VertexKey = (PositionKey<f32>, u64, u64, u32);
 
 /// Joins meshes that bound each other at planes beyond the first `parent_planes`.
 pub fn merge(children: &[(&Mesh, &Border)], parent_planes: usize) -> (Mesh, Border) {
@@ -44,8 +44,8 @@ pub fn merge(children: &[(&Mesh, &Border)], parent_planes: usize) -> (Mesh, Bord
 fn vertex_key(mesh: &Mesh, vertex: usize) -> VertexKey {
     (
         key(mesh.positions[vertex]),
-        mesh.texcoords.get(vertex).map_or([0; 2], |t| t.map(|c| (c + 0.0).to_bits())),
-        mesh.colors.get(vertex).copied().unwrap_or_default(),
+        mesh.texcoords.get(vertex).map_or(0, |&texcoord| texcoord_key(texcoord)),
+        mesh.colors.get(vertex).map_or(0, |&color| color_key(color)),
         mesh.materials[vertex],
     )
 }

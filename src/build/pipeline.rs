@@ -84,7 +84,12 @@ pub fn build(
             continue;
         }
         progress.reading(input, number + 1, inputs.len());
-        let load = |input: &Path| stages.time(Stage::Import, || import::load(input));
+        let load = |input: &Path| {
+            let spent = import::Spent::default();
+            let model = import::load_timed(input, &spent);
+            stages.add(Stage::Import, spent.total());
+            model
+        };
         let model = match ahead.take() {
             Some(model) => model,
             None => load(input),
@@ -98,16 +103,21 @@ pub fn build(
                 // Only the input that comes next in turn, and only where both fit in memory.
                 still_good.get(number + 1).is_some_and(Option::is_none) && fits_beside(input, next)
             });
-        let files = stages.time(Stage::Compare, || describe(&model.dependencies))?;
+        let dependencies = model.dependencies.clone();
         let triangles = model.triangle_count() as u64;
         progress.found(triangles);
         let up = options.up.or(model.up).unwrap_or_else(|| super::up::guess(&model));
-        let (built, read_ahead) = rayon::join(
-            || build_input(model, up, options, &output, &shared, &stages, progress),
+        let ((built, files), read_ahead) = rayon::join(
+            || {
+                rayon::join(
+                    || build_input(model, up, options, &output, &shared, &stages, progress),
+                    || describe(&dependencies, &stages),
+                )
+            },
             || next.map(|next| load(next)),
         );
         ahead = read_ahead;
-        let built = built?;
+        let (built, files) = (built?, files?);
         let mut warnings = built.warnings;
         let outcomes = outcomes(&built.blocks, &mut warnings);
         reports.push(InputReport {

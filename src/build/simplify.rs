@@ -105,15 +105,15 @@ pub struct Simplified {
 /// Simplifies `mesh`, whose border is thinned already ([`super::thin_border`]), to at most about
 /// `target` triangles as a node of `path` at `level`.
 pub fn simplify(
-    mesh: Mesh,
-    border: Border,
+    mesh: &Mesh,
+    border: &Border,
     path: &Path,
     level: u8,
     target: usize,
     simplifier: Simplifier,
     weights: AppearanceWeights,
 ) -> Simplified {
-    let (mesh, border) = compact(&mesh, &border);
+    let (mesh, border) = compact(mesh, border);
     let locked: Vec<bool> = border
         .planes
         .iter()
@@ -124,21 +124,21 @@ pub fn simplify(
     if simplifier == Simplifier::Clustering {
         return clustered(&mesh, &border, &locked, target);
     }
-    let mut best = Simplified { mesh, border, error: 0.0, step: LadderStep::Collapse };
-    if best.mesh.triangles.len() <= target {
-        return best;
-    }
-    let source = best.clone();
-    for step in [LadderStep::Collapse, LadderStep::Permissive] {
-        let result = collapse(&source.mesh, &source.border, &locked, target, step, weights);
-        if step == LadderStep::Collapse || result.mesh.triangles.len() < best.mesh.triangles.len() {
-            best = result;
-        }
-        if best.mesh.triangles.len() <= limit {
-            return best;
-        }
+    let source = Simplified { mesh, border, error: 0.0, step: LadderStep::Collapse };
+    if source.mesh.triangles.len() <= target {
+        return source;
     }
     let collapsed = |step| collapse(&source.mesh, &source.border, &locked, target, step, weights);
+    let mut best = collapsed(LadderStep::Collapse);
+    if best.mesh.triangles.len() > limit {
+        let permissive = collapsed(LadderStep::Permissive);
+        if permissive.mesh.triangles.len() < best.mesh.triangles.len() {
+            best = permissive;
+        }
+    }
+    if best.mesh.triangles.len() <= limit {
+        return best;
+    }
     let candidates = [
         collapsed(LadderStep::Across),
         collapsed(LadderStep::Prune),
@@ -228,7 +228,10 @@ fn collapse(
 /// meshoptimizer scales positions to a unit box and back, so a vertex that it did not move may
 /// differ in its last bits; such a vertex gets its exact position again.
 fn restore_unmoved(positions: &mut [[f32; 3]], originals: &[[f32; 3]]) {
-    let extent = originals.iter().flatten().fold(0f32, |most, c| most.max(c.abs()));
+    let extent = originals
+        .iter()
+        .fold([0f32; 3], |most, position| std::array::from_fn(|i| most[i].max(position[i].abs())));
+    let extent = extent.into_iter().fold(0f32, f32::max);
     let drift = extent * 4.0 * f32::EPSILON;
     for (position, original) in positions.iter_mut().zip(originals) {
         if position.iter().zip(original).all(|(new, old)| (new - old).abs() <= drift) {
@@ -249,6 +252,9 @@ fn attributes_of(mesh: &Mesh, weights: AppearanceWeights) -> (Vec<f32>, Vec<f32>
     }
     if colored {
         attribute_weights.extend([weights.color; 3]);
+    }
+    if textured && !colored {
+        return (mesh.texcoords.as_flattened().to_vec(), attribute_weights);
     }
     let mut attributes = Vec::with_capacity(mesh.positions.len() * attribute_weights.len());
     for vertex in 0..mesh.positions.len() {

@@ -35,7 +35,7 @@ pub fn skirts(mesh: &Mesh, border: &Border, path: &Path, level: u8, step: f64) -
             common &= common - 1;
             let Some(run) = plane.run_between(a, b, level) else { continue };
             if run.len() > 2 {
-                result.extend(cover(edge, a, b, &run, plane.axis, step));
+                result.extend(cover(edge, a, b, run, plane.axis, step));
             }
             break;
         }

@@ -1,7 +1,7 @@
 //! Where the time goes, summed over threads.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// A stage of the build, in the order in which a triangle meets them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,9 +67,13 @@ impl Stages {
     pub fn time<T>(&self, stage: Stage, work: impl FnOnce() -> T) -> T {
         let begin = Instant::now();
         let result = work();
-        let spent = begin.elapsed().as_nanos() as u64;
-        self.nanoseconds[stage as usize].fetch_add(spent, Ordering::Relaxed);
+        self.add(stage, begin.elapsed());
         result
+    }
+
+    /// Counts time that was measured elsewhere.
+    pub fn add(&self, stage: Stage, spent: Duration) {
+        self.nanoseconds[stage as usize].fetch_add(spent.as_nanos() as u64, Ordering::Relaxed);
     }
 
     /// Seconds of a stage so far.

@@ -21,12 +21,6 @@ pub fn set_strays_aside(parts: &[Part]) -> Option<(Vec<Part>, Vec<Part>)> {
             part.indices.as_chunks::<3>().0.iter().map(|t| t.map(|v| part.positions[v as usize]))
         })
     };
-    let mut edges: Vec<f64> = corners().map(|[a, b, _]| longest_side(a, b)).collect();
-    let count = edges.len();
-    if count < 2 {
-        return None;
-    }
-    let median_edge = *edges.select_nth_unstable_by(count / 2, f64::total_cmp).1;
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for position in corners().flatten() {
         for i in 0..3 {
@@ -34,7 +28,14 @@ pub fn set_strays_aside(parts: &[Part]) -> Option<(Vec<Part>, Vec<Part>)> {
             high[i] = high[i].max(position[i]);
         }
     }
-    if longest_side(low, high) / STEPS * STEPS_PER_EDGE <= median_edge {
+    let fine = longest_side(low, high) / STEPS * STEPS_PER_EDGE;
+    let (mut count, mut shorter) = (0, 0);
+    for [a, b, _] in corners() {
+        count += 1;
+        shorter += usize::from(longest_side(a, b) < fine);
+    }
+    // The median edge, that of place `count / 2`, is long enough.
+    if count < 2 || shorter <= count / 2 {
         return None;
     }
     // The box of nearly all triangles, and as much again on every side.

@@ -74,7 +74,7 @@ pub fn thin_border(mesh: &mut Mesh, border: &mut Border, path: &Path, level: u8)
             stuck += 1;
         }
     }
-    let mut target: FxHashMap<u32, u32> = FxHashMap::default();
+    let mut target: Vec<u32> = (0..mesh.positions.len() as u32).collect();
     for &vertex in &candidates {
         if !gone(border, vertex as usize) {
             continue;
@@ -93,16 +93,12 @@ pub fn thin_border(mesh: &mut Mesh, border: &mut Border, path: &Path, level: u8)
             [None, None] => None,
         };
         match nearest {
-            Some(end) => _ = target.insert(vertex, end),
+            Some(end) => target[vertex as usize] = end,
             None => stuck += 1,
         }
     }
-    for triangle in &mut mesh.triangles {
-        for corner in triangle.iter_mut() {
-            if let Some(&end) = target.get(corner) {
-                *corner = end;
-            }
-        }
+    for corner in mesh.triangles.as_flattened_mut() {
+        *corner = target[*corner as usize];
     }
     mesh.triangles.retain(|&[a, b, c]| a != b && b != c && c != a);
     stuck

@@ -28,6 +28,19 @@ pub(super) struct Tally {
 }
 
 impl Tally {
+    /// Adds what was counted elsewhere.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.not_finite += other.not_finite;
+        self.degenerate += other.degenerate;
+        self.duplicate += other.duplicate;
+        self.flat_polygons += other.flat_polygons;
+        self.not_triangles += other.not_triangles;
+        self.untextured_faces += other.untextured_faces;
+        self.texcoords_not_finite += other.texcoords_not_finite;
+        self.colors_clamped += other.colors_clamped;
+        self.unused_vertices += other.unused_vertices;
+    }
+
     /// Adds what was counted to `warnings`, naming the file.
     pub(super) fn report(&self, file: &Path, warnings: &mut Warnings) {
         let file = file.display();

@@ -49,6 +49,28 @@ impl<R: BufRead> Lines<R> {
     }
 }
 
+impl<'a> Lines<&'a [u8]> {
+    /// What has not been read yet.
+    pub(super) fn rest(&self) -> &'a [u8] {
+        self.reader
+    }
+
+    /// Goes on at `rest`, where a line was read by other means.
+    pub(super) fn go_on_at(&mut self, rest: &'a [u8]) {
+        self.reader = rest;
+        self.last += 1;
+    }
+}
+
+/// The end of the first statement that does not end before `from`: just behind its line feed.
+/// `None` where the text ends before it does.
+pub(super) fn statement_end(text: &[u8], from: usize) -> Option<usize> {
+    memchr::memchr_iter(b'\n', text.get(from..)?).map(|at| from + at).find_map(|at| {
+        let last = text[..at].iter().rev().find(|byte| **byte != b'\r');
+        (last != Some(&b'\\')).then_some(at + 1)
+    })
+}
+
 /// Bytes of a text file as text: UTF-8, or where it is none Latin-1, which exporters of western
 /// systems wrote for names with accents.
 pub(super) fn text(bytes: &[u8]) -> Cow<'_, str> {
@@ -95,6 +117,17 @@ mod tests {
     #[test]
     fn a_continuation_at_the_end_of_the_file_ends() {
         assert_eq!(all("f 1\\"), [(1, "f 1 ".to_owned())]);
+    }
+
+    #[test]
+    fn a_statement_ends_where_its_last_line_does() {
+        let text = b"v 1\r\nf 1 \\\n2 \\\r\n3\n\nend";
+        let ends: Vec<_> = (0..=text.len()).map(|from| statement_end(text, from)).collect();
+        let expected = [(5, Some(5)), (13, Some(18)), (1, Some(19)), (4, None)];
+        let expected: Vec<_> =
+            expected.iter().flat_map(|(times, end)| vec![*end; *times]).collect();
+        assert_eq!(ends, expected);
+        assert_eq!(statement_end(text, 99), None);
     }
 
     #[test]

@@ -18,6 +18,7 @@ mod obj;
 mod paths;
 mod picture;
 mod polygon;
+mod spent;
 mod textures;
 mod tokens;
 mod vertices;
@@ -28,15 +29,21 @@ use std::path::Path;
 
 pub use find::find_inputs;
 pub use picture::{Picture, decode_texture, texture_size};
+pub use spent::Spent;
 
 use crate::mesh::Model;
 use crate::{Error, Result};
 
 /// Reads one model file: OBJ, glTF or GLB, by its extension.
 pub fn load(path: &Path) -> Result<Model> {
+    load_timed(path, &Spent::default())
+}
+
+/// Reads one model file, and adds the time that the threads at work need for it to `spent`.
+pub fn load_timed(path: &Path, spent: &Spent) -> Result<Model> {
     match find::kind(path) {
-        Some(find::Kind::Obj) => obj::load(path),
-        Some(find::Kind::Gltf) => gltf::load(path),
+        Some(find::Kind::Obj) => obj::load(path, spent),
+        Some(find::Kind::Gltf) => spent.time(|| gltf::load(path)),
         None => {
             Err(Error::input(path, format!("not a model by its extension; {}", find::EXPECTED)))
         }

@@ -1,63 +1,126 @@
 //! Wavefront OBJ.
 //!
-//! Statements are read one at a time and triangles go straight into their parts, so that memory
-//! holds the result, the file's vertices, and nothing else. tobj, which reads the materials, is not
-//! used for the geometry: it keeps about 100 bytes for each face of an object until the object
-//! ends and hashes each corner, makes triangles of polylines, gives faces without texture
-//! coordinates those of the face before, and cannot say in which line an error is.
+//! The file is read in batches of chunks. Threads parse the chunks of a batch each on its own
+//! ([`statements`]); then the chunks are put in their order, which settles what their indices
+//! mean and to which part their faces belong; threads make triangles of them ([`corners`]); and
+//! in order again the triangles go into their parts. Meanwhile the next batch is parsed. The
+//! model does not depend on where chunks end. Memory holds the result, the file's vertices, and
+//! two batches.
+//!
+//! tobj, which reads the materials, is not used for the geometry: it keeps about 100 bytes for
+//! each face of an object until the object ends and hashes each corner, makes triangles of
+//! polylines, gives faces without texture coordinates those of the face before, and cannot say in
+//! which line an error is.
+
+mod chunks;
+mod corners;
+mod statements;
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+use self::chunks::Chunks;
+use self::corners::{Run, Triangles};
+use self::statements::{Change, Statements, WHITE, first_missing};
+use super::Spent;
 use super::clean::{Tally, clean};
-use super::color::{srgb_to_linear, to_unorm16};
-use super::lines::{Lines, not_text, text};
+use super::lines::not_text;
 use super::mtl::{Library, MtlMaterial, UvTransform};
 use super::paths::Finder;
-use super::polygon::Triangulator;
 use super::textures::Textures;
-use super::tokens::{corner, number, word};
-use super::vertices::{Attributes, NONE, Unifier};
+use super::vertices::Unifier;
 use crate::mesh::{Group, Model, Part, Warnings};
 use crate::{Error, Result};
 
-/// Read-ahead, in bytes; also how much is looked at to tell text from other files.
-const BUFFER_BYTES: usize = 1 << 20;
+/// How much is looked at to tell text from other files.
+const HEAD_BYTES: u64 = 1 << 20;
+
+/// Text that one thread parses at a time: it and what is made of it should stay in the cache.
+const CHUNK_BYTES: usize = 1 << 18;
+
+/// Chunks of a batch for each thread: enough to keep all busy when some take longer.
+const CHUNKS_PER_THREAD: usize = 4;
 
 /// Most vertices of a file, so that every index fits 32 bits with room for markers.
 const MOST_VERTICES: usize = u32::MAX as usize - 64;
 
-/// Most corners of a face: beyond this the ear clipping's own indices could overflow.
-const MOST_CORNERS: usize = 1 << 20;
-
 /// Reads the OBJ at `path` with its material libraries.
-pub(super) fn load(path: &Path) -> Result<Model> {
-    read(path, BufReader::with_capacity(BUFFER_BYTES, super::open(path)?))
+pub(super) fn load(path: &Path, spent: &Spent) -> Result<Model> {
+    read(path, super::open(path)?, CHUNK_BYTES, spent)
 }
 
 /// Reads an OBJ from `reader`; what it names is looked for beside `path`.
-fn read(path: &Path, mut reader: impl BufRead) -> Result<Model> {
+fn read(
+    path: &Path,
+    mut reader: impl Read + Send,
+    chunk_bytes: usize,
+    spent: &Spent,
+) -> Result<Model> {
     let unreadable = |error| Error::input(path, format!("cannot be read: {error}"));
-    let head = reader.fill_buf().map_err(unreadable)?;
+    let mut head = Vec::new();
+    (&mut reader).take(HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
     if head.is_empty() {
         return Err(Error::input(path, "is empty; expected a Wavefront OBJ with faces"));
     }
-    if let Some(what) = not_text(head) {
+    if let Some(what) = not_text(&head) {
         return Err(Error::input(path, what));
     }
     if head.starts_with(b"\xef\xbb\xbf") {
-        reader.consume(3);
+        head.drain(..3);
     }
-    let mut lines = Lines::new(reader);
+    let mut chunks = Chunks::new(head, reader, chunk_bytes);
     let mut obj = Obj::new(path);
-    while let Some((line, statement)) = lines.next().map_err(unreadable)? {
-        obj.statement(statement)
-            .map_err(|what| Error::input(path, format!("line {line}: {what}")))?;
+    let mut batch = Batch::parse(&mut chunks, spent);
+    loop {
+        let Batch { parsed, ended } = batch;
+        if parsed.is_empty() {
+            ended.map_err(unreadable)?;
+            return obj.finish(spent);
+        }
+        let (added, next) =
+            rayon::join(|| obj.add(parsed, spent), || Batch::parse(&mut chunks, spent));
+        added.map_err(|what| Error::input(path, what))?;
+        batch = next;
+        if batch.parsed.is_empty() && ended.is_err() {
+            batch.ended = ended;
+        }
     }
-    obj.finish(lines.count())
+}
+
+/// A chunk's text, and what it says.
+struct Parsed {
+    text: Vec<u8>,
+    statements: Statements,
+}
+
+/// Chunks that are parsed at the same time.
+struct Batch {
+    /// None at the end of the file.
+    parsed: Vec<Parsed>,
+    /// Why reading ended behind them, where it failed.
+    ended: std::io::Result<()>,
+}
+
+impl Batch {
+    fn parse(chunks: &mut Chunks<impl Read>, spent: &Spent) -> Self {
+        let mut texts = Vec::new();
+        let ended = spent.time(|| {
+            while texts.len() < CHUNKS_PER_THREAD * rayon::current_num_threads() {
+                match chunks.next()? {
+                    Some(text) => texts.push(text),
+                    None => break,
+                }
+            }
+            Ok(())
+        });
+        let parse =
+            |text: Vec<u8>| spent.time(|| Parsed { statements: Statements::of(&text), text });
+        Self { parsed: texts.into_par_iter().map(parse).collect(), ended }
+    }
 }
 
 /// A part in the making.
@@ -107,14 +170,17 @@ struct Obj<'a> {
     part: Option<u32>,
 
     unifier: Unifier,
-    triangulator: Triangulator,
-    /// Position and texture coordinate of each corner of the face at hand.
-    face: Vec<(u32, u32)>,
-    /// Positions of its corners.
-    outline: Vec<[f64; 3]>,
+    /// Lines of the chunks so far.
+    lines: u64,
 }
 
-const WHITE: [u16; 4] = [u16::MAX; 4];
+/// A chunk in its place.
+struct Placed {
+    statements: Statements,
+    runs: Vec<Run>,
+    /// How many positions and texture coordinates come before it.
+    before: [usize; 2],
+}
 
 impl<'a> Obj<'a> {
     fn new(path: &'a Path) -> Self {
@@ -140,161 +206,115 @@ impl<'a> Obj<'a> {
             part_of: FxHashMap::default(),
             part: None,
             unifier: Unifier::default(),
-            triangulator: Triangulator::default(),
-            face: Vec::new(),
-            outline: Vec::new(),
+            lines: 0,
         }
     }
 
-    fn statement(&mut self, statement: &[u8]) -> Result<(), String> {
-        let mut rest = statement;
-        match word(&mut rest) {
-            Some(b"v") => self.position(rest),
-            Some(b"vt") => self.texcoord(rest),
-            Some(b"f" | b"fo") => self.face(rest),
-            Some(b"o" | b"g") => {
-                self.start_group(text(rest).trim());
-                Ok(())
-            }
-            Some(b"usemtl") => {
-                self.use_material(text(rest).trim());
-                Ok(())
-            }
-            Some(b"mtllib") => {
-                self.read_libraries(text(rest).trim());
-                Ok(())
-            }
-            Some(b"p" | b"l" | b"curv" | b"curv2" | b"surf") => {
-                self.tally.not_triangles += 1;
-                Ok(())
-            }
-            // Comments, normals, smoothing groups, display attributes.
-            _ => Ok(()),
-        }
+    /// Adds the chunks that come next.
+    fn add(&mut self, parsed: Vec<Parsed>, spent: &Spent) -> Result<(), String> {
+        let placed: Vec<Placed> = spent
+            .time(|| parsed.into_iter().map(|chunk| self.place(chunk)).collect::<Result<_, _>>())?;
+        let positions = &self.positions;
+        let triangles: Vec<Triangles> = placed
+            .par_iter()
+            .map(|Placed { statements, runs, before }| {
+                spent.time(|| Triangles::of(statements, runs, *before, positions))
+            })
+            .collect();
+        drop(placed);
+        spent.time(|| {
+            self.unifier.grow(self.positions.len());
+            triangles.into_iter().try_for_each(|chunk| self.join(chunk))
+        })
     }
 
-    /// `v x y z`, `v x y z w` (the weight matters to curves alone), `v x y z r g b [a]`.
-    fn position(&mut self, mut rest: &[u8]) -> Result<(), String> {
-        let mut values = [0.0; 7];
-        let mut count = 0;
-        while let Some(word) = word(&mut rest) {
-            if word[0] == b'#' || count == values.len() {
-                break;
-            }
-            values[count] = number(word).ok_or_else(|| {
-                format!("vertex coordinate \"{}\"; expected a number", text(word))
-            })?;
-            count += 1;
+    /// Settles what a chunk's indices mean and to which parts its faces belong.
+    fn place(&mut self, Parsed { text, statements: mut chunk }: Parsed) -> Result<Placed, String> {
+        let before = [self.positions.len(), self.texcoords.len()];
+        let at_line = |(line, what): (u64, String)| format!("line {}: {what}", self.lines + line);
+        if (0..2).any(|kind| chunk.needed[kind] > before[kind] as i64) {
+            let missing = first_missing(&text, before);
+            return Err(missing.map_or_else(|| "an index is out of range".to_owned(), at_line));
         }
-        if count < 3 {
-            return Err(format!("vertex of {count} coordinates; expected 3"));
+        if let Some(problem) = chunk.problem.take() {
+            return Err(at_line(problem));
         }
-        if self.positions.len() >= MOST_VERTICES {
+        if before[0] + chunk.positions.len() > MOST_VERTICES
+            || before[1] + chunk.texcoords.len() > MOST_VERTICES
+        {
             return Err(format!("more than {MOST_VERTICES} vertices; divide the file"));
         }
-        if count >= 6 {
-            let given = [values[3], values[4], values[5]];
-            if given.iter().any(|part| !(0.0..=1.0).contains(part)) {
-                self.tally.colors_clamped += 1;
-            }
-            let [r, g, b] = given.map(|part| to_unorm16(srgb_to_linear(part)));
-            self.colors.resize(self.positions.len(), WHITE);
-            self.colors.push([r, g, b, u16::MAX]);
-        } else if !self.colors.is_empty() {
-            self.colors.push(WHITE);
+        self.lines += chunk.lines;
+        self.tally.add(&chunk.tally);
+        if !(self.colors.is_empty() && chunk.colors.is_empty()) {
+            self.colors.resize(before[0], WHITE);
+            self.colors.append(&mut chunk.colors);
+            self.colors.resize(before[0] + chunk.positions.len(), WHITE);
         }
-        self.positions.push([values[0], values[1], values[2]]);
-        Ok(())
+        self.positions.append(&mut chunk.positions);
+        self.texcoords.append(&mut chunk.texcoords);
+        let mut runs = Vec::with_capacity(chunk.changes.len() + 1);
+        let mut first = 0;
+        let face_count = chunk.faces.len();
+        for (end, change) in std::mem::take(&mut chunk.changes) {
+            self.run(first..end, &mut runs);
+            first = end;
+            match change {
+                Change::Group(name) => self.start_group(&name),
+                Change::Material(name) => self.use_material(&name),
+                Change::Libraries(names) => self.read_libraries(&names),
+            }
+        }
+        self.run(first..face_count, &mut runs);
+        Ok(Placed { statements: chunk, runs, before })
     }
 
-    fn texcoord(&mut self, mut rest: &[u8]) -> Result<(), String> {
-        let mut read = || -> Result<Option<f64>, String> {
-            match word(&mut rest) {
-                Some(word) if word[0] != b'#' => number(word).map(Some).ok_or_else(|| {
-                    format!("texture coordinate \"{}\"; expected a number", text(word))
-                }),
-                _ => Ok(None),
-            }
-        };
-        let u = read()?.ok_or("texture coordinate without a value; expected u and v")?;
-        let v = read()?.unwrap_or(0.0);
-        // Beyond f32's range is infinite where it is used.
-        if (u as f32).is_finite() && (v as f32).is_finite() {
-            self.texcoords.push([u, v]);
-        } else {
-            self.tally.texcoords_not_finite += 1;
-            self.texcoords.push([0.0, 1.0]);
+    /// Appends the run of these faces, if there are any, to `runs`.
+    fn run(&mut self, faces: std::ops::Range<usize>, runs: &mut Vec<Run>) {
+        if faces.is_empty() {
+            return;
         }
-        Ok(())
-    }
-
-    fn face(&mut self, mut rest: &[u8]) -> Result<(), String> {
-        self.face.clear();
-        let mut bare = false;
-        while let Some(word) = word(&mut rest) {
-            if word[0] == b'#' {
-                break;
-            }
-            let corner = corner(word).ok_or_else(|| {
-                format!("face corner \"{}\"; expected v, v/vt, v//vn or v/vt/vn", text(word))
-            })?;
-            let position = resolve(corner.position, self.positions.len(), "vertex")?;
-            let texcoord = if corner.texcoord == 0 {
-                bare = true;
-                NONE
-            } else {
-                resolve(corner.texcoord, self.texcoords.len(), "texture coordinate")?
-            };
-            self.face.push((position, texcoord));
-        }
-        if self.face.len() < 3 {
-            self.tally.not_triangles += 1;
-            return Ok(());
-        }
-        if self.face.len() > MOST_CORNERS {
-            let count = self.face.len();
-            return Err(format!("face of {count} corners; expected at most {MOST_CORNERS}"));
-        }
-        if self.unifier.len() + self.face.len() >= MOST_VERTICES {
-            return Err(format!("more than {MOST_VERTICES} distinct vertices; divide the file"));
-        }
-        let part_index = match self.part {
+        let part = match self.part {
             Some(part) => part,
             None => self.start_part(),
         };
-        let state = &mut self.parts[part_index as usize];
-        let used = &self.materials[state.part.material as usize];
+        let used = &self.materials[self.parts[part as usize].part.material as usize];
         // Texture coordinates stay with a material that may yet turn out to have a texture.
         let textured = used.material.material.texture.is_some() || !used.defined;
-        let transform = textured.then_some(&used.material.transform);
-        state.bare_faces += u64::from(bare && textured);
+        runs.push(Run { faces, part, textured });
+    }
 
-        let source = Attributes {
-            positions: &self.positions,
-            colors: &self.colors,
-            texcoords: &self.texcoords,
-        };
-        let (unifier, part, face) = (&mut self.unifier, &mut state.part, &self.face);
-        let mut vertex = |part: &mut Part, corner: u32| {
-            let (position, texcoord) = face[corner as usize];
-            let texcoord = if textured { texcoord } else { NONE };
-            let vertex = unifier.vertex(part_index, part, &source, position, texcoord, transform);
-            part.indices.push(vertex);
-        };
-        if face.len() == 3 {
-            (0..3).for_each(|corner| vertex(part, corner));
-            return Ok(());
+    /// Moves a chunk's triangles into their parts.
+    fn join(&mut self, chunk: Triangles) -> Result<(), String> {
+        if self.unifier.len() + chunk.vertices.len() >= MOST_VERTICES {
+            return Err(format!("more than {MOST_VERTICES} distinct vertices; divide the file"));
         }
-        self.outline.clear();
-        self.outline.extend(face.iter().map(|(position, _)| self.positions[*position as usize]));
-        if !self.outline.as_flattened().iter().all(|coordinate| coordinate.is_finite()) {
-            self.tally.not_finite += face.len() as u64 - 2;
-            return Ok(());
+        self.tally.add(&chunk.tally);
+        let mut vertices = Vec::with_capacity(chunk.vertices.len());
+        for pair in chunk.vertices {
+            let vertex = self.unifier.vertex(pair, || {
+                let part = &mut self.parts[pair.part as usize].part;
+                let used = &self.materials[part.material as usize];
+                part.positions.push(self.positions[pair.position as usize]);
+                if let Some(color) = self.colors.get(pair.position as usize) {
+                    part.colors.push(*color);
+                }
+                if used.material.material.texture.is_some() || !used.defined {
+                    let given = self.texcoords.get(pair.texcoord as usize);
+                    let texcoord = given.map_or([0.0; 2], |uv| used.material.transform.apply(*uv));
+                    part.texcoords.push(texcoord);
+                }
+                part.positions.len() as u32 - 1
+            });
+            vertices.push(vertex);
         }
-        let triangles = self.triangulator.triangulate(&self.outline);
-        self.tally.flat_polygons += u64::from(triangles.is_empty());
-        for corner in triangles.as_flattened() {
-            vertex(part, *corner);
+        let mut first = 0;
+        for (part, end, bare_faces) in chunk.runs {
+            let state = &mut self.parts[part as usize];
+            state.bare_faces += bare_faces;
+            let indices = &chunk.indices[first..end];
+            state.part.indices.extend(indices.iter().map(|&index| vertices[index as usize]));
+            first = end;
         }
         Ok(())
     }
@@ -437,7 +457,8 @@ impl<'a> Obj<'a> {
         }
     }
 
-    fn finish(mut self, line_count: u64) -> Result<Model> {
+    fn finish(mut self, spent: &Spent) -> Result<Model> {
+        let line_count = self.lines;
         if self.parts.is_empty() {
             let what = match (self.positions.len(), self.tally.not_triangles) {
                 (0, 0) => {
@@ -459,24 +480,15 @@ impl<'a> Obj<'a> {
         self.texcoords = Vec::new();
         self.unifier = Unifier::default();
 
-        let mut parts = Vec::with_capacity(self.parts.len());
-        for state in self.parts {
-            let mut part = state.part;
-            self.tally.untextured_faces += state.bare_faces;
-            // A part may have begun before the first coloured vertex of the file.
-            if white {
-                part.colors = Vec::new();
-            } else {
-                let missing = part.positions.len() - part.colors.len();
-                part.colors.splice(0..0, std::iter::repeat_n(WHITE, missing));
-            }
-            clean(&mut part, &mut self.tally);
+        let parts: Vec<(Part, Tally)> = std::mem::take(&mut self.parts)
+            .into_par_iter()
+            .map(|state| spent.time(|| finished(state, white)))
+            .collect();
+        let mut kept = Vec::with_capacity(parts.len());
+        for (part, tally) in parts {
+            self.tally.add(&tally);
             if !part.indices.is_empty() {
-                part.positions.shrink_to_fit();
-                part.texcoords.shrink_to_fit();
-                part.colors.shrink_to_fit();
-                part.indices.shrink_to_fit();
-                parts.push(part);
+                kept.push(part);
             }
         }
         self.tally.report(self.path, &mut self.warnings);
@@ -486,7 +498,7 @@ impl<'a> Obj<'a> {
             source: self.path.to_path_buf(),
             dependencies: self.dependencies,
             groups: self.groups,
-            parts,
+            parts: kept,
             materials: self.materials.into_iter().map(|used| used.material.material).collect(),
             textures: self.textures.list,
             up: None,
@@ -495,16 +507,22 @@ impl<'a> Obj<'a> {
     }
 }
 
-/// An index as written, from 1 or counted back from the last, to one from 0 below `count`.
-#[inline]
-fn resolve(index: i64, count: usize, what: &str) -> Result<u32, String> {
-    let from_zero = if index < 0 { count as i64 + index } else { index - 1 };
-    if from_zero < 0 || from_zero >= count as i64 {
-        return Err(format!(
-            "{what} index {index} of {count}; expected 1 to {count}, or -{count} to -1"
-        ));
+/// A part as it will stay, and what was left out. `white` is true where no vertex has a colour.
+fn finished(PartState { mut part, bare_faces }: PartState, white: bool) -> (Part, Tally) {
+    let mut tally = Tally { untextured_faces: bare_faces, ..Tally::default() };
+    // A part may have begun before the first coloured vertex of the file.
+    if white {
+        part.colors = Vec::new();
+    } else {
+        let missing = part.positions.len() - part.colors.len();
+        part.colors.splice(0..0, std::iter::repeat_n(WHITE, missing));
     }
-    Ok(from_zero as u32)
+    clean(&mut part, &mut tally);
+    part.positions.shrink_to_fit();
+    part.texcoords.shrink_to_fit();
+    part.colors.shrink_to_fit();
+    part.indices.shrink_to_fit();
+    (part, tally)
 }
 
 #[cfg(test)]

@@ -31,41 +31,52 @@ pub(super) fn number(word: &[u8]) -> Option<f64> {
     })
 }
 
-/// `[+-]digits[.digits]` whose digits fit 2^53: mantissa and power of ten are exact in f64, and
-/// one correctly rounded division of the two is the correctly rounded value (Clinger 1990).
+/// A word that is a plain decimal; see [`plain_decimal_at`].
 fn plain_decimal(word: &[u8]) -> Option<f64> {
-    let (negative, digits) = match word {
+    plain_decimal_at(word).filter(|(_, rest)| rest.is_empty()).map(|(value, _)| value)
+}
+
+/// Reads `[+-]digits[.digits]` whose digits fit 2^53 from the front of `bytes`; returns it and
+/// what follows. Mantissa and power of ten are exact in f64, and one correctly rounded division
+/// of the two is the correctly rounded value (Clinger 1990).
+#[inline]
+pub(super) fn plain_decimal_at(bytes: &[u8]) -> Option<(f64, &[u8])> {
+    let (negative, digits) = match bytes {
         [b'-', digits @ ..] => (true, digits),
         [b'+', digits @ ..] => (false, digits),
         digits => (false, digits),
     };
-    // 18 digits cannot overflow the u64; the point takes one more place.
-    if digits.is_empty() || digits.len() > 19 {
-        return None;
-    }
-    let mut mantissa = 0_u64;
-    let mut point = None;
-    for (place, byte) in digits.iter().enumerate() {
-        let digit = byte.wrapping_sub(b'0');
-        if digit < 10 {
-            mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(digit));
-        } else if *byte == b'.' && point.is_none() {
-            point = Some(place);
-        } else {
-            return None;
+    let (whole, length) = leading_digits(digits, 0);
+    let (mantissa, fraction_digits, end) = match digits.get(length) {
+        Some(b'.') => {
+            let (mantissa, more) = leading_digits(&digits[length + 1..], whole);
+            (mantissa, more, length + 1 + more)
         }
-    }
-    let fraction_digits = match point {
-        Some(_) if digits.len() == 1 => return None,
-        Some(place) => digits.len() - 1 - place,
-        None if digits.len() > 18 => return None,
-        None => 0,
+        _ => (whole, 0, length),
     };
-    if mantissa > 1 << 53 {
+    // 18 digits cannot overflow the u64.
+    let count = length + fraction_digits;
+    if count == 0 || count > 18 || mantissa > 1 << 53 {
         return None;
     }
     let value = mantissa as f64 / EXACT_POWERS[fraction_digits];
-    Some(if negative { -value } else { value })
+    Some((if negative { -value } else { value }, &digits[end..]))
+}
+
+/// Appends the decimal digits at the front of `bytes` to `value`; also returns how many there
+/// are. Wraps around where they are too many.
+#[inline]
+fn leading_digits(bytes: &[u8], mut value: u64) -> (u64, usize) {
+    let mut length = 0;
+    for byte in bytes {
+        let digit = byte.wrapping_sub(b'0');
+        if digit > 9 {
+            break;
+        }
+        value = value.wrapping_mul(10).wrapping_add(u64::from(digit));
+        length += 1;
+    }
+    (value, length)
 }
 
 /// A corner of a face as written: `v`, `v/vt`, `v//vn` or `v/vt/vn`, each from 1 or, negative,
@@ -79,23 +90,28 @@ pub(super) struct Corner {
 /// Reads a face's corner. `None` where it is none. Normals are checked for form and left.
 #[inline]
 pub(super) fn corner(word: &[u8]) -> Option<Corner> {
-    let (position, rest) = index(word)?;
+    corner_at(word).filter(|(_, rest)| rest.is_empty()).map(|(corner, _)| corner)
+}
+
+/// Reads a face's corner from the front of `bytes`; returns it and what follows. `None` where it
+/// is none, or is not followed by white space or the end.
+#[inline]
+pub(super) fn corner_at(bytes: &[u8]) -> Option<(Corner, &[u8])> {
+    let (position, mut rest) = index(bytes)?;
     let mut corner = Corner { position, texcoord: 0 };
-    let [b'/', rest @ ..] = rest else {
-        return rest.is_empty().then_some(corner);
-    };
-    let rest = if rest.is_empty() || rest[0] == b'/' {
-        rest
-    } else {
-        let (texcoord, rest) = index(rest)?;
-        corner.texcoord = texcoord;
-        rest
-    };
-    match rest {
-        [] | [b'/'] => Some(corner),
-        [b'/', normal @ ..] => index(normal)?.1.is_empty().then_some(corner),
-        _ => None,
+    if let [b'/', after @ ..] = rest {
+        rest = after;
+        if !matches!(rest, [] | [b'/' | ..=b' ', ..]) {
+            (corner.texcoord, rest) = index(rest)?;
+        }
+        if let [b'/', after @ ..] = rest {
+            rest = after;
+            if !matches!(rest, [] | [..=b' ', ..]) {
+                rest = index(rest)?.1;
+            }
+        }
     }
+    matches!(rest, [] | [..=b' ', ..]).then_some((corner, rest))
 }
 
 /// Reads an integer other than zero from the front of `bytes`; returns it and what follows.
@@ -105,21 +121,21 @@ fn index(bytes: &[u8]) -> Option<(i64, &[u8])> {
         [b'-', digits @ ..] => (true, digits),
         digits => (false, digits),
     };
-    let mut value = 0_i64;
-    let mut length = 0;
-    for byte in digits {
-        let digit = byte.wrapping_sub(b'0');
-        if digit > 9 {
-            break;
-        }
-        // Larger than any index there can be; saturating keeps it out of range.
-        value = value.saturating_mul(10).saturating_add(i64::from(digit));
-        length += 1;
-    }
-    if length == 0 || value == 0 {
+    let (value, length) = leading_digits(digits, 0);
+    // What may have wrapped around is larger than any index there can be.
+    let value = if length > 18 { beyond(&digits[..length]) } else { value as i64 };
+    if value == 0 {
         return None;
     }
     Some((if negative { -value } else { value }, &digits[length..]))
+}
+
+/// The value of many digits, saturated.
+#[cold]
+fn beyond(digits: &[u8]) -> i64 {
+    digits.iter().fold(0, |value: i64, digit| {
+        value.saturating_mul(10).saturating_add(i64::from(digit - b'0'))
+    })
 }
 
 #[cfg(test)]
@@ -182,6 +198,21 @@ mod tests {
         for text in ["", "0", "7/0", "a", "7/a", "7/8/a", "7/8/9/1", "1.5", "/1", "--1"] {
             assert_eq!(read(text), None, "{text}");
         }
+    }
+
+    #[test]
+    fn what_follows_a_number_or_a_corner_is_left() {
+        let decimal = plain_decimal_at(b"-1.25 7").unwrap();
+        assert_eq!((decimal.0, decimal.1), (-1.25, &b" 7"[..]));
+        assert_eq!(plain_decimal_at(b"12e3").unwrap().1, b"e3");
+        for text in ["", "-", ".", "x", "1234567890123456789", "9007199254740993"] {
+            assert_eq!(plain_decimal_at(text.as_bytes()), None, "{text}");
+        }
+        let corner = Corner { position: 1, texcoord: 2 };
+        assert_eq!(corner_at(b"1/2/3\r\n"), Some((corner, &b"\r\n"[..])));
+        assert_eq!(corner_at(b"1/2/ 3"), Some((corner, &b" 3"[..])));
+        assert_eq!(corner_at(b"1/2#"), None);
+        assert_eq!(corner_at(b"1\\"), None);
     }
 
     #[test]

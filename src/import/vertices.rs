@@ -1,13 +1,12 @@
 //! Pairs of position and texture coordinate become vertices, each pair once to a part.
 
-use super::mtl::UvTransform;
-use crate::mesh::Part;
+use std::collections::BTreeMap;
 
 /// No index.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Longest chain that is searched. A position that is used with more texture coordinates gets a
-/// second vertex for the same pair instead: harmless, and no file can make the search quadratic.
+/// Longest chain that is searched. Pairs whose position has more are looked up in a tree, so that
+/// no file can make the search quadratic.
 const LONGEST_SEARCH: u32 = 64;
 
 /// The vertices that use one position, as a chain: OBJ indices are dense, so a list per position
@@ -17,6 +16,19 @@ pub(super) struct Unifier {
     /// Per position: its newest entry, or [`NONE`].
     heads: Vec<u32>,
     entries: Vec<Entry>,
+    /// What was not found within [`LONGEST_SEARCH`] entries of its chain.
+    beyond: BTreeMap<Pair, u32>,
+}
+
+/// A use of a position in a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Pair {
+    /// The part's number.
+    pub(super) part: u32,
+    /// The position's number.
+    pub(super) position: u32,
+    /// The texture coordinate's number, or [`NONE`].
+    pub(super) texcoord: u32,
 }
 
 struct Entry {
@@ -26,59 +38,38 @@ struct Entry {
     next: u32,
 }
 
-/// The source's attributes by position and texture coordinate.
-pub(super) struct Attributes<'a> {
-    pub(super) positions: &'a [[f64; 3]],
-    /// Empty, or one per position.
-    pub(super) colors: &'a [[u16; 4]],
-    /// As written, v upwards.
-    pub(super) texcoords: &'a [[f64; 2]],
-}
-
 impl Unifier {
-    /// The vertex of `part` (whose index is `part_index`) for `position` and `texcoord`
-    /// ([`NONE`] where it has none), appended to the part where it is new.
-    ///
-    /// Both indices are in range. With a transform every vertex gets a texture coordinate.
+    /// Makes room for that many positions.
+    pub(super) fn grow(&mut self, positions: usize) {
+        self.heads.resize(positions.max(self.heads.len()), NONE);
+    }
+
+    /// The vertex of a pair, whose position there is room for; `make` makes it where it is new.
     #[inline]
-    pub(super) fn vertex(
-        &mut self,
-        part_index: u32,
-        part: &mut Part,
-        source: &Attributes,
-        position: u32,
-        texcoord: u32,
-        transform: Option<&UvTransform>,
-    ) -> u32 {
-        if self.heads.len() < source.positions.len() {
-            self.heads.resize(source.positions.len(), NONE);
-        }
-        let head = self.heads[position as usize];
+    pub(super) fn vertex(&mut self, pair: Pair, make: impl FnOnce() -> u32) -> u32 {
+        let head = self.heads[pair.position as usize];
         let mut at = head;
-        for _ in 0..LONGEST_SEARCH {
-            let Some(entry) = self.entries.get(at as usize) else { break };
-            if entry.part == part_index && entry.texcoord == texcoord {
+        let mut searched = 0;
+        while let Some(entry) = self.entries.get(at as usize) {
+            if entry.part == pair.part && entry.texcoord == pair.texcoord {
                 return entry.vertex;
             }
             at = entry.next;
+            searched += 1;
+            if searched == LONGEST_SEARCH {
+                return *self.beyond.entry(pair).or_insert_with(make);
+            }
         }
-        let vertex = part.positions.len() as u32;
-        part.positions.push(source.positions[position as usize]);
-        if let Some(color) = source.colors.get(position as usize) {
-            part.colors.push(*color);
-        }
-        if let Some(transform) = transform {
-            let given = source.texcoords.get(texcoord as usize);
-            part.texcoords.push(given.map_or([0.0; 2], |uv| transform.apply(*uv)));
-        }
-        self.heads[position as usize] = self.entries.len() as u32;
-        self.entries.push(Entry { part: part_index, texcoord, vertex, next: head });
+        let vertex = make();
+        self.heads[pair.position as usize] = self.entries.len() as u32;
+        let Pair { part, texcoord, .. } = pair;
+        self.entries.push(Entry { part, texcoord, vertex, next: head });
         vertex
     }
 
-    /// How many vertices there are in all parts.
+    /// How many pairs there are in all parts.
     pub(super) fn len(&self) -> usize {
-        self.entries.len()
+        self.entries.len() + self.beyond.len()
     }
 
     /// How many of `positions` positions no vertex uses.
@@ -94,45 +85,33 @@ mod tests {
 
     #[test]
     fn a_pair_is_one_vertex_to_a_part() {
-        let source = Attributes {
-            positions: &[[0.0; 3], [1.0; 3], [2.0; 3]],
-            colors: &[],
-            texcoords: &[[0.0, 1.0], [0.5; 2]],
-        };
-        let (mut unifier, mut parts) = (Unifier::default(), [Part::default(), Part::default()]);
+        let (mut unifier, mut made) = (Unifier::default(), [0, 0]);
+        unifier.grow(3);
         let mut vertex = |part: usize, position, texcoord| {
-            unifier.vertex(
-                part as u32,
-                &mut parts[part],
-                &source,
-                position,
-                texcoord,
-                Some(&UvTransform::default()),
-            )
+            unifier.vertex(Pair { part: part as u32, position, texcoord }, || {
+                made[part] += 1;
+                made[part] - 1
+            })
         };
         assert_eq!([vertex(0, 1, 0), vertex(0, 1, 1), vertex(0, 1, 0)], [0, 1, 0]);
         assert_eq!([vertex(1, 1, 1), vertex(0, 0, NONE), vertex(0, 1, 1)], [0, 2, 1]);
-        assert_eq!(unifier.unused(3), 1);
-        assert_eq!(parts[0].texcoords, [[0.0; 2], [0.5; 2], [0.0; 2]]);
+        assert_eq!((unifier.unused(3), unifier.len()), (1, 4));
     }
 
     #[test]
     fn very_long_chains_stay_right() {
-        let texcoords: Vec<_> = (0..1000).map(|at| [f64::from(at), 1.0]).collect();
-        let source = Attributes { positions: &[[0.0; 3]], colors: &[], texcoords: &texcoords };
-        let (mut unifier, mut part) = (Unifier::default(), Part::default());
-        for round in 0..2 {
+        let mut unifier = Unifier::default();
+        unifier.grow(1);
+        let mut made = 0;
+        for _ in 0..2 {
             for texcoord in 0..1000 {
-                let vertex = unifier.vertex(
-                    0,
-                    &mut part,
-                    &source,
-                    0,
-                    texcoord,
-                    Some(&UvTransform::default()),
-                );
-                assert_eq!(part.texcoords[vertex as usize], [texcoord as f32, 0.0], "{round}");
+                let vertex = unifier.vertex(Pair { part: 0, position: 0, texcoord }, || {
+                    made += 1;
+                    made - 1
+                });
+                assert_eq!(vertex, texcoord);
             }
         }
+        assert_eq!((made, unifier.len()), (1000, 1000));
     }
 }

@@ -5,7 +5,7 @@ mod material;
 mod model;
 mod piece;
 
-pub use coordinate::{Coordinate, PositionKey, key, wide};
+pub use coordinate::{Coordinate, Key, PositionKey, color_key, key, texcoord_key, wide};
 pub use material::{AlphaMode, Material, TextureData, TextureSource, Wrap};
 pub use model::{Group, Model, Part, UpAxis, Warnings};
 pub use piece::Mesh;

@@ -49,6 +49,26 @@ impl<C: Coordinate> Mesh<C> {
         index
     }
 
+    /// A mesh of these of its vertices, in this order, and these triangles over them.
+    pub fn with_vertices(&self, vertices: &[u32], triangles: Vec<[u32; 3]>) -> Self {
+        fn pick<T: Copy>(values: &[T], vertices: &[u32]) -> Vec<T> {
+            if values.is_empty() {
+                return Vec::new();
+            }
+            // Room for the vertices that a cut adds.
+            let mut picked = Vec::with_capacity(vertices.len() + vertices.len() / 16 + 16);
+            picked.extend(vertices.iter().map(|&vertex| values[vertex as usize]));
+            picked
+        }
+        Self {
+            positions: pick(&self.positions, vertices),
+            texcoords: pick(&self.texcoords, vertices),
+            colors: pick(&self.colors, vertices),
+            materials: pick(&self.materials, vertices),
+            triangles,
+        }
+    }
+
     /// Bounding box of the vertices, metres from the block's origin; `None` without vertices.
     pub fn bounds(&self) -> Option<([C; 3], [C; 3])> {
         let first = *self.positions.first()?;

@@ -1,5 +1,7 @@
 use std::fs;
 
+use super::super::color::{srgb_to_linear, to_unorm16};
+use super::super::lines::text;
 use super::super::tests::check;
 use super::*;
 use crate::mesh::{AlphaMode, Wrap};
@@ -18,9 +20,22 @@ fn folder_with(files: &[(&str, &str)]) -> tempfile::TempDir {
 }
 
 fn read_from(folder: &tempfile::TempDir, obj: impl AsRef<[u8]>) -> Result<Model> {
-    let model = super::read(&folder.path().join("city.obj"), obj.as_ref())?;
+    let model = read_in_chunks(folder, obj.as_ref(), CHUNK_BYTES)?;
     check(&model);
     Ok(model)
+}
+
+fn read_in_chunks(folder: &tempfile::TempDir, obj: &[u8], chunk_bytes: usize) -> Result<Model> {
+    super::read(&folder.path().join("city.obj"), obj, chunk_bytes, &Spent::default())
+}
+
+/// The model or the error must be the same wherever the text is divided.
+fn check_chunks(folder: &tempfile::TempDir, obj: &[u8]) {
+    let whole = format!("{:?}", read_in_chunks(folder, obj, CHUNK_BYTES));
+    for chunk_bytes in [1, 2, 7, 23, 60, 150] {
+        let divided = format!("{:?}", read_in_chunks(folder, obj, chunk_bytes));
+        assert_eq!(divided, whole, "in chunks of {chunk_bytes}:\n{}", text(obj));
+    }
 }
 
 /// What is wrong with `obj`, without the file's name.
@@ -297,7 +312,9 @@ fn random_files_are_read_as_tobj_reads_them() {
             continue;
         }
         let mtl = "newmtl a\nmap_Kd t.png\nnewmtl b\nmap_Kd t.png\n";
-        let model = read(&obj, &[("a.mtl", mtl), ("t.png", "")]).unwrap();
+        let folder = folder_with(&[("a.mtl", mtl), ("t.png", "")]);
+        check_chunks(&folder, obj.as_bytes());
+        let model = read_from(&folder, &obj).unwrap();
         let mut ours = Soup::new();
         for part in &model.parts {
             let key = (
@@ -339,6 +356,7 @@ fn every_truncation_gives_a_model_or_an_error() {
     let folder = folder_with(&[("a.mtl", "newmtl a\nmap_Kd a.mtl\n")]);
     for length in 0..SAMPLE.len() {
         let _ = read_from(&folder, &SAMPLE[..length]);
+        check_chunks(&folder, &SAMPLE.as_bytes()[..length]);
     }
 }
 
@@ -376,7 +394,83 @@ fn mutated_files_give_a_model_or_an_error() {
             mutated.splice(at..end, pieces[random.below(pieces.len())].iter().copied());
         }
         let _ = read_from(&folder, &mutated);
+        check_chunks(&folder, &mutated);
     }
+}
+
+/// Statements that lean on what came before: indices that count back, faces beside and behind the
+/// vertices that they lack, groups and materials that end and come again, colours that begin late.
+#[test]
+fn where_chunks_end_makes_no_difference() {
+    let lines: [&[u8]; 36] = [
+        b"v 0 0 0\n",
+        b"v 1 0 0\r\n",
+        b"v 1.5 1 0 0.5 0.5 0.5\n",
+        b"v 0 1 -2.25e-1\n",
+        b"v 1 2 3 4\n",
+        b"v  7\t-8 +9.0 \n",
+        b"v nan 0 0\n",
+        b"v 12345678901234567890 0 .5\n",
+        b"vt 0 0\n",
+        b"vt 0.5 1.5 0\n",
+        b"vt 1e39 0\n",
+        b"vt 1\n",
+        b"vn 0 0 1\n",
+        b"vn 0 0 \\\n1\n",
+        b"f -1 -2 -3\n",
+        b"f -1/-1 -2/-1 -3/-1\n",
+        b"f 1 2 3\n",
+        b"f 1/1 2/1 3/1\n",
+        b"f 1 2 4 3\n",
+        b"f -4 -3 -2 -1\n",
+        b"f 1//1 2//1 \\\r\n-1//1\n",
+        b"f 2 3 5 # five\n",
+        b"f 9 2 1\n",
+        b"f 1 2\n",
+        b"f 1 2 x\n",
+        b"f 1 1/9 2\n",
+        b"g a\n",
+        b"g b\n",
+        b"o\n",
+        b"usemtl a\n",
+        b"usemtl b\n",
+        b"usemtl c\n",
+        b"mtllib a.mtl\n",
+        b"mtllib gone.mtl\n",
+        b"l 1 2\n",
+        b"\n",
+    ];
+    let folder = folder_with(&[("a.mtl", "newmtl a\nmap_Kd a.mtl\nnewmtl b\nKd 1 0 0\n")]);
+    let mut random = Random(3);
+    let mut good = 0;
+    for round in 0..1500 {
+        let mut obj = format!("{SQUARE}vt 0 1\n").repeat(round % 3).into_bytes();
+        for _ in 0..random.below(40) {
+            // Mostly what is right, so that files are read to their end.
+            let limit = if random.below(8) == 0 { lines.len() } else { 21 };
+            obj.extend_from_slice(lines[random.below(limit)]);
+            if random.below(4) == 0 {
+                obj.extend_from_slice(lines[26 + random.below(10)]);
+            }
+        }
+        good += usize::from(read_in_chunks(&folder, &obj, CHUNK_BYTES).is_ok());
+        check_chunks(&folder, &obj);
+    }
+    assert!(good > 300, "{good} files without an error");
+}
+
+#[test]
+fn the_number_of_threads_makes_no_difference() {
+    let folder = folder_with(&[("a.mtl", "newmtl a\nmap_Kd a.mtl\n")]);
+    let read = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let obj = SAMPLE.repeat(30);
+        format!("{:?}", pool.install(|| read_in_chunks(&folder, obj.as_bytes(), 100)))
+    };
+    let one = read(1);
+    assert!(one.starts_with("Ok"), "{one}");
+    assert_eq!(read(2), one);
+    assert_eq!(read(7), one);
 }
 
 #[test]

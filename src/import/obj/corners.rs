@@ -1,0 +1,139 @@
+//! The triangles of one chunk over its own list of vertices: what threads can do of joining the
+//! chunks before their vertices get the numbers that they have in their parts.
+
+use std::ops::Range;
+
+use rustc_hash::FxHashMap;
+
+use super::super::clean::Tally;
+use super::super::polygon::Triangulator;
+use super::super::vertices::{NONE, Pair, Unifier};
+use super::statements::Statements;
+
+/// Consecutive faces of one part.
+pub(super) struct Run {
+    pub(super) faces: Range<usize>,
+    pub(super) part: u32,
+    /// Its material has, or may yet turn out to have, a texture.
+    pub(super) textured: bool,
+}
+
+/// A chunk's triangles.
+#[derive(Default)]
+pub(super) struct Triangles {
+    /// The vertices in the order of their first use.
+    pub(super) vertices: Vec<Pair>,
+    /// Indices into `vertices`, three for each triangle.
+    pub(super) indices: Vec<u32>,
+    /// Part of each run, where its indices end, and its faces without texture coordinates.
+    pub(super) runs: Vec<(u32, usize, u64)>,
+    pub(super) tally: Tally,
+}
+
+impl Triangles {
+    /// Triangulates the faces of a chunk. `before` is how many positions and texture coordinates
+    /// come before it; `positions` are all up to its end, and every index is in range.
+    pub(super) fn of(
+        statements: &Statements,
+        runs: &[Run],
+        before: [usize; 2],
+        positions: &[[f64; 3]],
+    ) -> Self {
+        let mut result =
+            Self { indices: Vec::with_capacity(statements.corners.len()), ..Self::default() };
+        let corners: Vec<[u32; 2]> = statements
+            .corners
+            .iter()
+            .map(|[position, texcoord]| {
+                let position = position.resolve(before[0]).unwrap_or(0);
+                [position, texcoord.resolve(before[1]).unwrap_or(NONE)]
+            })
+            .collect();
+        let places = Places::of(&corners);
+        let mut unifier = Unifier::default();
+        unifier.grow(places.count());
+        let mut triangulator = Triangulator::default();
+        let mut outline = Vec::new();
+        let mut first = 0;
+        for run in runs {
+            let mut bare_faces = 0;
+            for &count in &statements.faces[run.faces.clone()] {
+                let face = &corners[first..first + count as usize];
+                first += count as usize;
+                if run.textured {
+                    bare_faces += u64::from(face.iter().any(|[_, texcoord]| *texcoord == NONE));
+                }
+                let mut add = |corner: usize| {
+                    let [position, texcoord] = face[corner];
+                    let texcoord = if run.textured { texcoord } else { NONE };
+                    let pair = Pair { part: run.part, position: places.number(position), texcoord };
+                    let index = unifier.vertex(pair, || {
+                        result.vertices.push(Pair { position, ..pair });
+                        result.vertices.len() as u32 - 1
+                    });
+                    result.indices.push(index);
+                };
+                if face.len() == 3 {
+                    (0..3).for_each(add);
+                    continue;
+                }
+                outline.clear();
+                outline.extend(face.iter().map(|[position, _]| positions[*position as usize]));
+                if !outline.as_flattened().iter().all(|coordinate| coordinate.is_finite()) {
+                    result.tally.not_finite += face.len() as u64 - 2;
+                    continue;
+                }
+                let triangles = triangulator.triangulate(&outline);
+                result.tally.flat_polygons += u64::from(triangles.is_empty());
+                triangles.as_flattened().iter().for_each(|corner| add(*corner as usize));
+            }
+            result.runs.push((run.part, result.indices.len(), bare_faces));
+        }
+        result
+    }
+}
+
+/// Small numbers for the positions that a chunk uses.
+enum Places {
+    /// Their distance from the lowest: nearly always the positions stand together.
+    Dense { low: u32, count: usize },
+    /// In the order of their first use.
+    Sparse(FxHashMap<u32, u32>),
+}
+
+/// Positions are numbered by their distance where at most so many come to a corner.
+const MOST_PER_CORNER: usize = 4;
+
+impl Places {
+    fn of(corners: &[[u32; 2]]) -> Self {
+        let all = || corners.iter().map(|[position, _]| *position);
+        let (Some(low), Some(high)) = (all().min(), all().max()) else {
+            return Self::Dense { low: 0, count: 0 };
+        };
+        let count = (high - low) as usize + 1;
+        if count <= MOST_PER_CORNER * corners.len() {
+            return Self::Dense { low, count };
+        }
+        let mut numbers = FxHashMap::default();
+        for position in all() {
+            let next = numbers.len() as u32;
+            numbers.entry(position).or_insert(next);
+        }
+        Self::Sparse(numbers)
+    }
+
+    fn count(&self) -> usize {
+        match self {
+            Self::Dense { count, .. } => *count,
+            Self::Sparse(numbers) => numbers.len(),
+        }
+    }
+
+    #[inline]
+    fn number(&self, position: u32) -> u32 {
+        match self {
+            Self::Dense { low, .. } => position - low,
+            Self::Sparse(numbers) => numbers[&position],
+        }
+    }
+}

@@ -1,0 +1,332 @@
+//! One chunk's statements, without knowing what came before the chunk.
+//!
+//! An index that counts back may reach before the chunk, so it is kept relative to the chunk's
+//! beginning, and how many elements the chunk needs before it is all that is checked later.
+
+use super::super::clean::Tally;
+use super::super::color::{srgb_to_linear, to_unorm16};
+use super::super::lines::{Lines, text};
+use super::super::tokens::{Corner, corner, corner_at, number, plain_decimal_at, word};
+
+/// Most corners of a face: beyond this the ear clipping's own indices could overflow.
+const MOST_CORNERS: usize = 1 << 20;
+
+pub(super) const WHITE: [u16; 4] = [u16::MAX; 4];
+
+/// Added to indices that are relative to the chunk's beginning; there are fewer elements.
+const RELATIVE: i64 = 1 << 40;
+/// Stands for an index that is not there.
+const ABSENT: i64 = i64::MIN;
+
+/// A corner's index, from 0.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reference(i64);
+
+impl Reference {
+    /// The element that is meant, where so many come before the chunk; `None` where none is.
+    #[inline]
+    pub(super) fn resolve(self, before: usize) -> Option<u32> {
+        match self.0 {
+            ABSENT => None,
+            from_start if from_start < RELATIVE / 2 => Some(from_start as u32),
+            relative => Some((relative - RELATIVE + before as i64) as u32),
+        }
+    }
+}
+
+/// A statement that changes what the faces behind it belong to.
+#[derive(Debug)]
+pub(super) enum Change {
+    Group(String),
+    Material(String),
+    Libraries(String),
+}
+
+/// A chunk's statements.
+#[derive(Default)]
+pub(super) struct Statements {
+    pub(super) positions: Vec<[f64; 3]>,
+    /// Empty until a vertex of the chunk has a colour, then one per position.
+    pub(super) colors: Vec<[u16; 4]>,
+    pub(super) texcoords: Vec<[f64; 2]>,
+    /// Position and texture coordinate of all faces' corners.
+    pub(super) corners: Vec<[Reference; 2]>,
+    /// How many corners each face has, at least 3.
+    pub(super) faces: Vec<u32>,
+    /// With the number of faces before each.
+    pub(super) changes: Vec<(usize, Change)>,
+    /// How many positions and texture coordinates there must be before the chunk.
+    pub(super) needed: [i64; 2],
+    pub(super) tally: Tally,
+    pub(super) lines: u64,
+    /// What cannot be read, and its line from 1; nothing behind it was read.
+    pub(super) problem: Option<(u64, String)>,
+}
+
+impl Statements {
+    pub(super) fn of(chunk: &[u8]) -> Self {
+        let mut result = Self::default();
+        let mut lines = Lines::new(chunk);
+        loop {
+            while let Some(rest) = result.common(lines.rest()) {
+                lines.go_on_at(rest);
+            }
+            // Bytes in memory can always be read.
+            let Ok(Some((line, statement))) = lines.next() else { break };
+            if let Err(what) = result.statement(statement) {
+                result.problem = Some((line, what));
+                break;
+            }
+        }
+        result.lines = lines.count();
+        result
+    }
+
+    /// Reads the line at the front of `text` where it is one of those that files are full of, and
+    /// returns what follows. Whatever is out of the ordinary is left to [`Self::statement`].
+    #[inline]
+    fn common<'a>(&mut self, text: &'a [u8]) -> Option<&'a [u8]> {
+        match text {
+            [b'v', b' ', rest @ ..] => {
+                let ([x, y, z], rest) = plain_decimals(rest)?;
+                let rest = line_end(rest)?;
+                if !self.colors.is_empty() {
+                    self.colors.push(WHITE);
+                }
+                self.positions.push([x, y, z]);
+                Some(rest)
+            }
+            [b'v', b't', b' ', rest @ ..] => {
+                // 18 digits are always finite in f32.
+                let ([u, v], rest) = plain_decimals(rest)?;
+                let rest = line_end(rest)?;
+                self.texcoords.push([u, v]);
+                Some(rest)
+            }
+            [b'f', b' ', rest @ ..] => {
+                let first = self.corners.len();
+                let mut rest = rest;
+                let end = loop {
+                    rest = blanks(rest);
+                    if let Some(end) = line_end(rest) {
+                        break Some(end);
+                    }
+                    let Some((corner, after)) = corner_at(rest) else { break None };
+                    self.corner(corner);
+                    rest = after;
+                };
+                let count = self.corners.len() - first;
+                if end.is_none() || !(3..=MOST_CORNERS).contains(&count) {
+                    self.corners.truncate(first);
+                    return None;
+                }
+                self.faces.push(count as u32);
+                end
+            }
+            [b'v', b'n', ..] | [b'#', ..] => {
+                let end = memchr::memchr(b'\n', text)?;
+                (!matches!(text[end - 1], b'\\' | b'\r')).then_some(&text[end + 1..])
+            }
+            _ => None,
+        }
+    }
+
+    fn statement(&mut self, statement: &[u8]) -> Result<(), String> {
+        let mut rest = statement;
+        let name = |rest| text(rest).trim().to_owned();
+        let change = match word(&mut rest) {
+            Some(b"v") => return self.position(rest),
+            Some(b"vt") => return self.texcoord(rest),
+            Some(b"f" | b"fo") => return self.face(rest),
+            Some(b"o" | b"g") => Change::Group(name(rest)),
+            Some(b"usemtl") => Change::Material(name(rest)),
+            Some(b"mtllib") => Change::Libraries(name(rest)),
+            Some(b"p" | b"l" | b"curv" | b"curv2" | b"surf") => {
+                self.tally.not_triangles += 1;
+                return Ok(());
+            }
+            // Comments, normals, smoothing groups, display attributes.
+            _ => return Ok(()),
+        };
+        self.changes.push((self.faces.len(), change));
+        Ok(())
+    }
+
+    /// `v x y z`, `v x y z w` (the weight matters to curves alone), `v x y z r g b [a]`.
+    fn position(&mut self, mut rest: &[u8]) -> Result<(), String> {
+        let mut values = [0.0; 7];
+        let mut count = 0;
+        while let Some(word) = word(&mut rest) {
+            if word[0] == b'#' || count == values.len() {
+                break;
+            }
+            values[count] = number(word).ok_or_else(|| {
+                format!("vertex coordinate \"{}\"; expected a number", text(word))
+            })?;
+            count += 1;
+        }
+        if count < 3 {
+            return Err(format!("vertex of {count} coordinates; expected 3"));
+        }
+        if count >= 6 {
+            let given = [values[3], values[4], values[5]];
+            if given.iter().any(|part| !(0.0..=1.0).contains(part)) {
+                self.tally.colors_clamped += 1;
+            }
+            let [r, g, b] = given.map(|part| to_unorm16(srgb_to_linear(part)));
+            self.colors.resize(self.positions.len(), WHITE);
+            self.colors.push([r, g, b, u16::MAX]);
+        } else if !self.colors.is_empty() {
+            self.colors.push(WHITE);
+        }
+        self.positions.push([values[0], values[1], values[2]]);
+        Ok(())
+    }
+
+    fn texcoord(&mut self, mut rest: &[u8]) -> Result<(), String> {
+        let mut read = || -> Result<Option<f64>, String> {
+            match word(&mut rest) {
+                Some(word) if word[0] != b'#' => number(word).map(Some).ok_or_else(|| {
+                    format!("texture coordinate \"{}\"; expected a number", text(word))
+                }),
+                _ => Ok(None),
+            }
+        };
+        let u = read()?.ok_or("texture coordinate without a value; expected u and v")?;
+        let v = read()?.unwrap_or(0.0);
+        // Beyond f32's range is infinite where it is used.
+        if (u as f32).is_finite() && (v as f32).is_finite() {
+            self.texcoords.push([u, v]);
+        } else {
+            self.tally.texcoords_not_finite += 1;
+            self.texcoords.push([0.0, 1.0]);
+        }
+        Ok(())
+    }
+
+    fn face(&mut self, rest: &[u8]) -> Result<(), String> {
+        let first = self.corners.len();
+        for_corners(rest, |corner| {
+            self.corner(corner);
+            Ok(())
+        })?;
+        let count = self.corners.len() - first;
+        if count > MOST_CORNERS {
+            return Err(format!("face of {count} corners; expected at most {MOST_CORNERS}"));
+        }
+        if count < 3 {
+            self.tally.not_triangles += 1;
+            self.corners.truncate(first);
+        } else {
+            self.faces.push(count as u32);
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn corner(&mut self, corner: Corner) {
+        let counts = [self.positions.len() as i64, self.texcoords.len() as i64];
+        let mut reference = |index: i64, kind: usize| {
+            let (needed, reference) = if index > 0 {
+                (index - counts[kind], index - 1)
+            } else {
+                let place = counts[kind] + index;
+                (-place, RELATIVE + place)
+            };
+            self.needed[kind] = self.needed[kind].max(needed);
+            Reference(reference)
+        };
+        let position = reference(corner.position, 0);
+        let texcoord = match corner.texcoord {
+            0 => Reference(ABSENT),
+            index => reference(index, 1),
+        };
+        self.corners.push([position, texcoord]);
+    }
+}
+
+/// Visits a face's corners.
+fn for_corners(
+    mut rest: &[u8],
+    mut visit: impl FnMut(Corner) -> Result<(), String>,
+) -> Result<(), String> {
+    while let Some(word) = word(&mut rest) {
+        if word[0] == b'#' {
+            break;
+        }
+        let corner = corner(word).ok_or_else(|| {
+            format!("face corner \"{}\"; expected v, v/vt, v//vn or v/vt/vn", text(word))
+        })?;
+        visit(corner)?;
+    }
+    Ok(())
+}
+
+/// The first corner of a chunk, with its line from 1, that means an element that is not there,
+/// where so many positions and texture coordinates come before the chunk.
+pub(super) fn first_missing(chunk: &[u8], before: [usize; 2]) -> Option<(u64, String)> {
+    let [mut positions, mut texcoords] = before;
+    let mut lines = Lines::new(chunk);
+    while let Ok(Some((line, statement))) = lines.next() {
+        let mut rest = statement;
+        match word(&mut rest) {
+            Some(b"v") => positions += 1,
+            Some(b"vt") => texcoords += 1,
+            Some(b"f" | b"fo") => {
+                let missing = for_corners(rest, |corner| {
+                    check(corner.position, positions, "vertex")?;
+                    match corner.texcoord {
+                        0 => Ok(()),
+                        index => check(index, texcoords, "texture coordinate"),
+                    }
+                });
+                if let Err(what) = missing {
+                    return Some((line, what));
+                }
+            }
+            _ => {}
+        }
+    }
+    None
+}
+
+/// Refuses an index, from 1 or counted back from the last, that is beyond `count` elements.
+fn check(index: i64, count: usize, what: &str) -> Result<(), String> {
+    if index.unsigned_abs() > count as u64 {
+        return Err(format!(
+            "{what} index {index} of {count}; expected 1 to {count}, or -{count} to -1"
+        ));
+    }
+    Ok(())
+}
+
+/// Plain decimals at the front of `text`, each followed by white space or the end.
+#[inline]
+fn plain_decimals<const N: usize>(mut text: &[u8]) -> Option<([f64; N], &[u8])> {
+    let mut values = [0.0; N];
+    for value in &mut values {
+        (*value, text) = plain_decimal_at(blanks(text))?;
+        if !matches!(text, [] | [..=b' ', ..]) {
+            return None;
+        }
+    }
+    Some((values, text))
+}
+
+/// What follows the spaces and tabulators at the front of `text`.
+#[inline]
+fn blanks(mut text: &[u8]) -> &[u8] {
+    while let [b' ' | b'\t', rest @ ..] = text {
+        text = rest;
+    }
+    text
+}
+
+/// What follows the line whose end alone is at the front of `text`.
+#[inline]
+fn line_end(text: &[u8]) -> Option<&[u8]> {
+    match blanks(text) {
+        [b'\n', rest @ ..] | [b'\r', b'\n', rest @ ..] => Some(rest),
+        _ => None,
+    }
+}
