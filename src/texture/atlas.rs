@@ -5,8 +5,9 @@ use super::charts::UvBox;
 use super::fill;
 use super::islands::Islands;
 use super::level::LevelPicture;
-use super::pack::{self, Packing, Shape};
+use super::pack::{self, Packing, Placement};
 use super::raster::{self, Rasterizer};
+use super::shape::Shape;
 use super::split;
 
 /// Sides of atlases are multiples of this, so that two mip levels are exact halves.
@@ -41,8 +42,18 @@ pub(crate) struct SheetPicture<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PatchPlace {
     pub page: usize,
-    /// Added to a position in the level picture gives the position in the page.
+    /// True where columns and rows of the level picture are exchanged in the page.
+    pub turned: bool,
+    /// Added to a position in the level picture, turned where it is, gives that in the page.
     pub shift: [f64; 2],
+}
+
+impl PatchPlace {
+    /// Where a position of the level picture is in the page, in texels.
+    pub fn texel(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [x, y] = if self.turned { [y, x] } else { [x, y] };
+        [x + self.shift[0], y + self.shift[1]]
+    }
 }
 
 /// A page of texels.
@@ -59,6 +70,8 @@ pub(crate) struct Atlas {
     pub places: Vec<PatchPlace>,
     /// For each picture of the sheet the patch of each triangle.
     pub patches: Vec<Vec<u32>>,
+    /// True where the page's opposite sides meet and patches lie across them.
+    pub wraps: bool,
 }
 
 /// A window of a level picture, in texels; it may reach beyond the picture, whose border texels
@@ -94,7 +107,8 @@ impl Sheet<'_> {
         }
         let (patches, assigned) = self.patches();
         let shapes: Vec<&Shape> = patches.iter().map(|patch| &patch.shape).collect();
-        let packing = pack::pack(&shapes, (self.max_side / self.cell).max(1))
+        let multiple = SIDE_MULTIPLE.div_ceil(self.cell);
+        let packing = pack::pack(&shapes, (self.max_side / self.cell).max(1), multiple)
             .filter(|packing| packing.pages.len() <= max_pages);
         let packed_texels =
             packing.as_ref().map_or(usize::MAX, |packing| packing.area() * self.cell * self.cell);
@@ -131,8 +145,9 @@ impl Sheet<'_> {
         let shift = window.origin.map(|start| -(start as f64));
         Atlas {
             pages: vec![page],
-            places: vec![PatchPlace { page: 0, shift }],
+            places: vec![PatchPlace { page: 0, turned: false, shift }],
             patches: vec![vec![0; lone.corners.len()]],
+            wraps: false,
         }
     }
 
@@ -249,31 +264,57 @@ impl Sheet<'_> {
         let mut places = Vec::with_capacity(patches.len());
         for (patch, placement) in patches.iter().zip(&packing.placements) {
             let page = &mut pages[placement.page];
-            for [row, from, to] in &patch.shape.runs {
-                let (row, from, to) = (*row as usize, *from as usize, *to as usize);
-                let window = Window {
-                    origin: [
-                        patch.origin[0] + (from * self.cell) as isize,
-                        patch.origin[1] + (row * self.cell) as isize,
-                    ],
-                    size: [(to - from) * self.cell, self.cell],
-                };
-                let target = [placement.x + from, placement.y + row];
-                owned[placement.page].set_span(target[1], target[0], target[0] + to - from);
-                let picture = self.pictures[patch.picture].picture;
-                page.copy(picture, window, target.map(|cell| cell * self.cell));
-            }
-            let target = [placement.x, placement.y];
+            self.copy_patch(patch, placement, page, &mut owned[placement.page]);
+            let origin = patch.origin.map(|texel| texel as f64);
+            let [x, y] = if placement.turned { [origin[1], origin[0]] } else { origin };
             places.push(PatchPlace {
                 page: placement.page,
-                shift: [0, 1]
-                    .map(|axis| (target[axis] * self.cell) as f64 - patch.origin[axis] as f64),
+                turned: placement.turned,
+                shift: [(placement.x * self.cell) as f64 - x, (placement.y * self.cell) as f64 - y],
             });
         }
         for (page, owned) in pages.iter_mut().zip(&owned) {
             page.fill_empty_cells(owned, self.cell);
         }
-        Atlas { pages, places, patches: assigned }
+        Atlas { pages, places, patches: assigned, wraps: packing.wraps }
+    }
+
+    /// Copies a patch's cells, over the page's sides where it lies across them.
+    fn copy_patch(
+        &self,
+        patch: &Patch,
+        placement: &Placement,
+        page: &mut Page,
+        owned: &mut BitGrid,
+    ) {
+        let picture = self.pictures[patch.picture].picture;
+        let sides = [owned.width(), owned.height()];
+        let along = usize::from(placement.turned);
+        for [row, from, to] in &patch.shape.runs {
+            let mut from = *from as usize;
+            while from < *to as usize {
+                let mut target = [placement.x, placement.y];
+                target[along] = (target[along] + from) % sides[along];
+                target[1 - along] = (target[1 - along] + *row as usize) % sides[1 - along];
+                let count = (*to as usize - from).min(sides[along] - target[along]);
+                let window = Window {
+                    origin: [
+                        patch.origin[0] + (from * self.cell) as isize,
+                        patch.origin[1] + (*row as usize * self.cell) as isize,
+                    ],
+                    size: [count * self.cell, self.cell],
+                };
+                let texel = target.map(|cell| cell * self.cell);
+                if placement.turned {
+                    (target[1]..target[1] + count).for_each(|y| owned.set(target[0], y));
+                    page.copy_turned(picture, window, texel);
+                } else {
+                    owned.set_span(target[1], target[0], target[0] + count);
+                    page.copy(picture, window, texel);
+                }
+                from += count;
+            }
+        }
     }
 }
 
@@ -325,6 +366,22 @@ impl Page {
             }
             for texel in right.chunks_exact_mut(channels) {
                 texel.copy_from_slice(&source[(inside - 1) * channels..]);
+            }
+        }
+    }
+
+    /// The same with columns and rows exchanged.
+    fn copy_turned(&mut self, picture: &LevelPicture, window: Window, target: [usize; 2]) {
+        let channels = picture.channels;
+        let mut upright = Page::new(window.size, channels);
+        upright.copy(picture, window, [0; 2]);
+        let [width, height] = window.size;
+        for y in 0..width.min(self.size[1] - target[1]) {
+            for x in 0..height.min(self.size[0] - target[0]) {
+                let to = ((target[1] + y) * self.size[0] + target[0] + x) * channels;
+                let from = (x * width + y) * channels;
+                self.pixels[to..to + channels]
+                    .copy_from_slice(&upright.pixels[from..from + channels]);
             }
         }
     }
