@@ -140,8 +140,7 @@ impl Sheet<'_> {
 
     fn crop(&self, window: Window) -> Atlas {
         let lone = &self.pictures[0];
-        let mut page = Page::new(window.size, lone.picture.channels);
-        page.copy(lone.picture, window, [0; 2]);
+        let page = Page::window(lone.picture, window);
         let shift = window.origin.map(|start| -(start as f64));
         Atlas {
             pages: vec![page],
@@ -341,6 +340,24 @@ impl Page {
         Self { size, pixels: vec![0; size[0] * size[1] * channels] }
     }
 
+    /// A window as a page of its own.
+    fn window(picture: &LevelPicture, window: Window) -> Self {
+        let inside = (0..2).all(|axis| {
+            let end = window.origin[axis] + window.size[axis] as isize;
+            window.origin[axis] >= 0 && end <= picture.size[axis] as isize
+        });
+        if !inside {
+            let mut page = Self::new(window.size, picture.channels);
+            page.copy(picture, window, [0; 2]);
+            return page;
+        }
+        let [left, top] = window.origin.map(|start| start as usize);
+        let [width, height] = window.size;
+        let mut pixels = Vec::with_capacity(width * height * picture.channels);
+        (top..top + height).for_each(|y| pixels.extend_from_slice(picture.row(y, left, width)));
+        Self { size: window.size, pixels }
+    }
+
     fn channels(&self) -> usize {
         self.pixels.len() / (self.size[0] * self.size[1]).max(1)
     }
@@ -407,14 +424,17 @@ impl Page {
         }
         fill::fill_all(&mut colors, 3, owned);
         for y in 0..self.size[1] {
-            for x in (0..columns).filter(|x| !owned.get(*x, y / cell)) {
-                let color = &colors[(y / cell * columns + x) * 3..][..3];
-                let end = ((x + 1) * cell).min(self.size[0]);
-                let row = &mut self.pixels
-                    [(y * self.size[0] + x * cell) * 3..(y * self.size[0] + end) * 3];
-                for texel in row.chunks_exact_mut(3) {
-                    texel.copy_from_slice(color);
+            let row = &mut self.pixels[y * self.size[0] * 3..][..self.size[0] * 3];
+            let colors = &colors[y / cell * columns * 3..][..columns * 3];
+            let mut free = 0;
+            for (start, end) in owned.runs(y / cell).chain([(columns, columns)]) {
+                for x in free..start {
+                    let texels = x * cell * 3..((x + 1) * cell * 3).min(row.len());
+                    for texel in row[texels].as_chunks_mut::<3>().0 {
+                        texel.copy_from_slice(&colors[x * 3..][..3]);
+                    }
                 }
+                free = end;
             }
         }
     }

@@ -162,7 +162,7 @@ fn one_page(shapes: &[Shape], order: &[usize], max: usize, multiple: usize) -> O
 fn place_all(pieces: &[[Piece; 2]], order: &[usize], size: [usize; 2]) -> Option<Vec<Placement>> {
     let mut ring = Ring::new(size[0], size[1]);
     let mut placements = vec![Placement::default(); pieces.len()];
-    for index in order {
+    for (placed, index) in order.iter().enumerate() {
         let [upright, turned] = &pieces[*index];
         let first = ring.find(upright, size[1]);
         let ends = first.map_or(usize::MAX, |place| place[1] + upright.size[1]);
@@ -173,7 +173,9 @@ fn place_all(pieces: &[[Piece; 2]], order: &[usize], size: [usize; 2]) -> Option
             (Some(place), None) => (place, false),
             (None, None) => return None,
         };
-        ring.put(&pieces[*index][usize::from(turned)], place);
+        if placed + 1 < order.len() {
+            ring.put(&pieces[*index][usize::from(turned)], place);
+        }
         placements[*index] = Placement { page: 0, x: place[0], y: place[1], turned };
     }
     Some(placements)

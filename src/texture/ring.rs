@@ -134,15 +134,30 @@ impl Ring {
         }
     }
 
+    /// The longest run of free cells of a row.
     fn gap(&self, row: usize) -> u32 {
-        let mut free = !self.rows[row] & self.cells;
+        let free = !self.rows[row] & self.cells;
         if free == self.cells {
             return self.columns;
         }
+        // By power of two: where runs of that length begin.
+        let mut begins = [free; 8];
+        for power in 1..begins.len() {
+            let shorter = begins[power - 1];
+            begins[power] = if 1 << power < self.columns {
+                shorter & self.moved(shorter, 1 << (power - 1))
+            } else {
+                0
+            };
+        }
         let mut longest = 0;
-        while free != 0 {
-            free &= self.moved(free, 1);
-            longest += 1;
+        let mut places = self.cells;
+        for (power, begins) in begins.iter().enumerate().rev() {
+            let longer = places & self.moved(*begins, longest % self.columns);
+            if longer != 0 {
+                places = longer;
+                longest += 1 << power;
+            }
         }
         longest
     }
