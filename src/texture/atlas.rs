@@ -5,8 +5,9 @@ use super::charts::UvBox;
 use super::fill;
 use super::islands::Islands;
 use super::level::LevelPicture;
-use super::pack::{self, Packing, Shape};
+use super::pack::{self, Packing, Placement};
 use super::raster::{self, Rasterizer};
+use super::shape::Shape;
 use super::split;
 
 /// Sides of atlases are multiples of this, so that two mip levels are exact halves.
@@ -41,8 +42,18 @@ pub(crate) struct SheetPicture<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PatchPlace {
     pub page: usize,
-    /// Added to a position in the level picture gives the position in the page.
+    /// True where columns and rows of the level picture are exchanged in the page.
+    pub turned: bool,
+    /// Added to a position in the level picture, turned where it is, gives that in the page.
     pub shift: [f64; 2],
+}
+
+impl PatchPlace {
+    /// Where a position of the level picture is in the page, in texels.
+    pub fn texel(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [x, y] = if self.turned { [y, x] } else { [x, y] };
+        [x + self.shift[0], y + self.shift[1]]
+    }
 }
 
 /// A page of texels.
@@ -59,6 +70,8 @@ pub(crate) struct Atlas {
     pub places: Vec<PatchPlace>,
     /// For each picture of the sheet the patch of each triangle.
     pub patches: Vec<Vec<u32>>,
+    /// True where the page's opposite sides meet and patches lie across them.
+    pub wraps: bool,
 }
 
 /// A window of a level picture, in texels; it may reach beyond the picture, whose border texels
@@ -94,7 +107,8 @@ impl Sheet<'_> {
         }
         let (patches, assigned) = self.patches();
         let shapes: Vec<&Shape> = patches.iter().map(|patch| &patch.shape).collect();
-        let packing = pack::pack(&shapes, (self.max_side / self.cell).max(1))
+        let multiple = SIDE_MULTIPLE.div_ceil(self.cell);
+        let packing = pack::pack(&shapes, (self.max_side / self.cell).max(1), multiple)
             .filter(|packing| packing.pages.len() <= max_pages);
         let packed_texels =
             packing.as_ref().map_or(usize::MAX, |packing| packing.area() * self.cell * self.cell);
@@ -126,13 +140,13 @@ impl Sheet<'_> {
 
     fn crop(&self, window: Window) -> Atlas {
         let lone = &self.pictures[0];
-        let mut page = Page::new(window.size, lone.picture.channels);
-        page.copy(lone.picture, window, [0; 2]);
+        let page = Page::window(lone.picture, window);
         let shift = window.origin.map(|start| -(start as f64));
         Atlas {
             pages: vec![page],
-            places: vec![PatchPlace { page: 0, shift }],
+            places: vec![PatchPlace { page: 0, turned: false, shift }],
             patches: vec![vec![0; lone.corners.len()]],
+            wraps: false,
         }
     }
 
@@ -249,31 +263,57 @@ impl Sheet<'_> {
         let mut places = Vec::with_capacity(patches.len());
         for (patch, placement) in patches.iter().zip(&packing.placements) {
             let page = &mut pages[placement.page];
-            for [row, from, to] in &patch.shape.runs {
-                let (row, from, to) = (*row as usize, *from as usize, *to as usize);
-                let window = Window {
-                    origin: [
-                        patch.origin[0] + (from * self.cell) as isize,
-                        patch.origin[1] + (row * self.cell) as isize,
-                    ],
-                    size: [(to - from) * self.cell, self.cell],
-                };
-                let target = [placement.x + from, placement.y + row];
-                owned[placement.page].set_span(target[1], target[0], target[0] + to - from);
-                let picture = self.pictures[patch.picture].picture;
-                page.copy(picture, window, target.map(|cell| cell * self.cell));
-            }
-            let target = [placement.x, placement.y];
+            self.copy_patch(patch, placement, page, &mut owned[placement.page]);
+            let origin = patch.origin.map(|texel| texel as f64);
+            let [x, y] = if placement.turned { [origin[1], origin[0]] } else { origin };
             places.push(PatchPlace {
                 page: placement.page,
-                shift: [0, 1]
-                    .map(|axis| (target[axis] * self.cell) as f64 - patch.origin[axis] as f64),
+                turned: placement.turned,
+                shift: [(placement.x * self.cell) as f64 - x, (placement.y * self.cell) as f64 - y],
             });
         }
         for (page, owned) in pages.iter_mut().zip(&owned) {
             page.fill_empty_cells(owned, self.cell);
         }
-        Atlas { pages, places, patches: assigned }
+        Atlas { pages, places, patches: assigned, wraps: packing.wraps }
+    }
+
+    /// Copies a patch's cells, over the page's sides where it lies across them.
+    fn copy_patch(
+        &self,
+        patch: &Patch,
+        placement: &Placement,
+        page: &mut Page,
+        owned: &mut BitGrid,
+    ) {
+        let picture = self.pictures[patch.picture].picture;
+        let sides = [owned.width(), owned.height()];
+        let along = usize::from(placement.turned);
+        for [row, from, to] in &patch.shape.runs {
+            let mut from = *from as usize;
+            while from < *to as usize {
+                let mut target = [placement.x, placement.y];
+                target[along] = (target[along] + from) % sides[along];
+                target[1 - along] = (target[1 - along] + *row as usize) % sides[1 - along];
+                let count = (*to as usize - from).min(sides[along] - target[along]);
+                let window = Window {
+                    origin: [
+                        patch.origin[0] + (from * self.cell) as isize,
+                        patch.origin[1] + (*row as usize * self.cell) as isize,
+                    ],
+                    size: [count * self.cell, self.cell],
+                };
+                let texel = target.map(|cell| cell * self.cell);
+                if placement.turned {
+                    (target[1]..target[1] + count).for_each(|y| owned.set(target[0], y));
+                    page.copy_turned(picture, window, texel);
+                } else {
+                    owned.set_span(target[1], target[0], target[0] + count);
+                    page.copy(picture, window, texel);
+                }
+                from += count;
+            }
+        }
     }
 }
 
@@ -298,6 +338,24 @@ impl SheetPicture<'_> {
 impl Page {
     fn new(size: [usize; 2], channels: usize) -> Self {
         Self { size, pixels: vec![0; size[0] * size[1] * channels] }
+    }
+
+    /// A window as a page of its own.
+    fn window(picture: &LevelPicture, window: Window) -> Self {
+        let inside = (0..2).all(|axis| {
+            let end = window.origin[axis] + window.size[axis] as isize;
+            window.origin[axis] >= 0 && end <= picture.size[axis] as isize
+        });
+        if !inside {
+            let mut page = Self::new(window.size, picture.channels);
+            page.copy(picture, window, [0; 2]);
+            return page;
+        }
+        let [left, top] = window.origin.map(|start| start as usize);
+        let [width, height] = window.size;
+        let mut pixels = Vec::with_capacity(width * height * picture.channels);
+        (top..top + height).for_each(|y| pixels.extend_from_slice(picture.row(y, left, width)));
+        Self { size: window.size, pixels }
     }
 
     fn channels(&self) -> usize {
@@ -329,6 +387,22 @@ impl Page {
         }
     }
 
+    /// The same with columns and rows exchanged.
+    fn copy_turned(&mut self, picture: &LevelPicture, window: Window, target: [usize; 2]) {
+        let channels = picture.channels;
+        let mut upright = Page::new(window.size, channels);
+        upright.copy(picture, window, [0; 2]);
+        let [width, height] = window.size;
+        for y in 0..width.min(self.size[1] - target[1]) {
+            for x in 0..height.min(self.size[0] - target[0]) {
+                let to = ((target[1] + y) * self.size[0] + target[0] + x) * channels;
+                let from = (x * width + y) * channels;
+                self.pixels[to..to + channels]
+                    .copy_from_slice(&upright.pixels[from..from + channels]);
+            }
+        }
+    }
+
     /// Gives cells that no island owns a flat colour from those around, for encoders and for the
     /// mip levels beyond those that the gutters promise.
     fn fill_empty_cells(&mut self, owned: &BitGrid, cell: usize) {
@@ -350,14 +424,17 @@ impl Page {
         }
         fill::fill_all(&mut colors, 3, owned);
         for y in 0..self.size[1] {
-            for x in (0..columns).filter(|x| !owned.get(*x, y / cell)) {
-                let color = &colors[(y / cell * columns + x) * 3..][..3];
-                let end = ((x + 1) * cell).min(self.size[0]);
-                let row = &mut self.pixels
-                    [(y * self.size[0] + x * cell) * 3..(y * self.size[0] + end) * 3];
-                for texel in row.chunks_exact_mut(3) {
-                    texel.copy_from_slice(color);
+            let row = &mut self.pixels[y * self.size[0] * 3..][..self.size[0] * 3];
+            let colors = &colors[y / cell * columns * 3..][..columns * 3];
+            let mut free = 0;
+            for (start, end) in owned.runs(y / cell).chain([(columns, columns)]) {
+                for x in free..start {
+                    let texels = x * cell * 3..((x + 1) * cell * 3).min(row.len());
+                    for texel in row[texels].as_chunks_mut::<3>().0 {
+                        texel.copy_from_slice(&colors[x * 3..][..3]);
+                    }
                 }
+                free = end;
             }
         }
     }

@@ -33,8 +33,13 @@ impl UvBox {
 
     pub fn unite(&mut self, other: &UvBox) {
         for axis in 0..2 {
-            self.min[axis] = self.min[axis].min(other.min[axis]);
-            self.max[axis] = self.max[axis].max(other.max[axis]);
+            // Comparisons, as the functions of f64 also look for what is not a number.
+            if other.min[axis] < self.min[axis] {
+                self.min[axis] = other.min[axis];
+            }
+            if other.max[axis] > self.max[axis] {
+                self.max[axis] = other.max[axis];
+            }
         }
     }
 

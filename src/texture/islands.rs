@@ -4,7 +4,7 @@
 //! each other; so do charts that use the same texels, which are then stored once.
 
 use super::bits::BitGrid;
-use super::pack::Shape;
+use super::shape::Shape;
 
 /// The islands of one cell grid.
 #[derive(Debug, Default)]

@@ -76,25 +76,27 @@ impl LevelPicture {
         let (linear, byte) = (srgb::to_linear(), srgb::to_byte());
         let light = |value: u8| u32::from(linear[usize::from(value)]);
         let [width, height] = self.size;
-        let mut pixels = Vec::with_capacity(width.div_ceil(2) * height.div_ceil(2) * 3);
-        for y in (0..height).step_by(2) {
+        let columns = width.div_ceil(2);
+        let mut pixels = vec![0; columns * height.div_ceil(2) * 3];
+        for (index, result) in pixels.chunks_exact_mut(columns * 3).enumerate() {
+            let (y, below) = (2 * index, (2 * index + 1).min(height - 1));
             let (upper, last) = self.row(y, 0, width).as_chunks::<6>();
-            let (lower, last_lower) = self.row((y + 1).min(height - 1), 0, width).as_chunks::<6>();
-            pixels.extend(upper.iter().zip(lower).flat_map(|(upper, lower)| {
-                [0, 1, 2].map(|channel| {
+            let (lower, last_lower) = self.row(below, 0, width).as_chunks::<6>();
+            let (texels, last_texel) = result.split_at_mut(upper.len() * 3);
+            for ((texel, upper), lower) in
+                texels.as_chunks_mut::<3>().0.iter_mut().zip(upper).zip(lower)
+            {
+                for channel in 0..3 {
                     let sum = light(upper[channel])
                         + light(upper[channel + 3])
                         + light(lower[channel])
                         + light(lower[channel + 3]);
-                    byte.of(((sum + 2) >> 2) as u16)
-                })
-            }));
-            let pairs = last.iter().zip(last_lower);
-            pixels.extend(
-                pairs.map(|(upper, lower)| {
-                    byte.of(((light(*upper) + light(*lower) + 1) >> 1) as u16)
-                }),
-            );
+                    texel[channel] = byte.of(((sum + 2) >> 2) as u16);
+                }
+            }
+            for ((value, upper), lower) in last_texel.iter_mut().zip(last).zip(last_lower) {
+                *value = byte.of(((light(*upper) + light(*lower) + 1) >> 1) as u16);
+            }
         }
         pixels
     }

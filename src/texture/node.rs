@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
 
-use super::atlas::{Atlas, Page, Sheet, SheetPicture};
+use super::atlas::{Atlas, Page, PatchPlace, Sheet, SheetPicture};
 use super::block::{BlockTextures, Prepared};
 use super::charts::{self, Charts, NO_CHART};
 use super::encode;
@@ -61,12 +61,19 @@ impl Mapping {
     }
 }
 
-/// From a position in a level picture to a texture coordinate of an image: `(texel + shift) · unit`.
+/// From a position in a level picture to a texture coordinate of an image.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     image: usize,
-    shift: [f64; 2],
+    patch: PatchPlace,
     unit: [f64; 2],
+}
+
+impl Place {
+    fn texcoord(&self, texel: [f64; 2]) -> [f32; 2] {
+        let texel = self.patch.texel(texel);
+        [0, 1].map(|axis| (texel[axis] * self.unit[axis]) as f32)
+    }
 }
 
 /// The place of triangles without texture.
@@ -153,6 +160,8 @@ struct NodeBuilder<'a> {
     place_of: Vec<u32>,
     places: Vec<Place>,
     images: Vec<NodeImage>,
+    /// Atlases whose opposite sides meet.
+    wrapping: Vec<usize>,
     warnings: Warnings,
 }
 
@@ -168,6 +177,7 @@ impl<'a> NodeBuilder<'a> {
             place_of: vec![NO_PLACE; mesh.triangles.len()],
             places: Vec::new(),
             images: Vec::new(),
+            wrapping: Vec::new(),
             warnings: Warnings::default(),
         }
     }
@@ -367,7 +377,7 @@ impl<'a> NodeBuilder<'a> {
         let first_place = self.places.len() as u32;
         self.places.extend(atlas.places.iter().map(|place| Place {
             image: first_image + place.page,
-            shift: place.shift,
+            patch: *place,
             unit: atlas.pages[place.page].size.map(|side| 1.0 / side as f64),
         }));
         for (members, patches) in members.iter().zip(&atlas.patches) {
@@ -380,6 +390,9 @@ impl<'a> NodeBuilder<'a> {
         }
         for page in &atlas.pages {
             let image = self.encode(page, channels)?;
+            if atlas.wraps {
+                self.wrapping.push(self.images.len());
+            }
             self.images.push(image);
         }
         Ok(())
@@ -423,7 +436,7 @@ impl<'a> NodeBuilder<'a> {
                             self.images.len() - 1
                         }
                     };
-                    self.places.push(Place { image, shift: [0.0; 2], unit: [1.0; 2] });
+                    self.places.push(Place { image, patch: PatchPlace::default(), unit: [1.0; 2] });
                     places.insert(material, self.places.len() as u32 - 1);
                     self.places.len() as u32 - 1
                 }
@@ -505,13 +518,14 @@ impl<'a> NodeBuilder<'a> {
         (mode, cutoff, material.double_sided)
     }
 
-    /// The wrapping of a primitive: the material's where the picture is shared, clamped in atlases.
+    /// The wrapping of a primitive: the material's where the picture is shared; in atlases that of
+    /// the page.
     fn wrap(&self, material: u32, image: Option<usize>) -> [Wrap; 2] {
         let shared = image
             .is_some_and(|image| matches!(self.images[image].data, NodeImageData::Shared { .. }));
         match self.block.model.materials.get(material as usize) {
             Some(material) if shared => material.wrap,
-            _ if image.is_some() => [Wrap::Clamp; 2],
+            _ if image.is_some_and(|image| !self.wrapping.contains(&image)) => [Wrap::Clamp; 2],
             _ => [Wrap::Repeat; 2],
         }
     }
@@ -542,8 +556,7 @@ impl<'a> NodeBuilder<'a> {
                     else {
                         return uv;
                     };
-                    let texel = mapping.texel(uv);
-                    [0, 1].map(|axis| ((texel[axis] + place.shift[axis]) * place.unit[axis]) as f32)
+                    place.texcoord(mapping.texel(uv))
                 })
                 .collect(),
         };

@@ -1,65 +1,21 @@
 //! Packing shapes of cells into rectangles, by shape rather than by bounding box.
 //!
-//! Shapes are placed largest first at the lowest, then leftmost place where they fit (as xatlas
-//! does by brute force); all places of a row are tried at once, 64 to a machine word.
+//! Shapes are placed largest first at the lowest, then leftmost place where they fit, upright or
+//! turned, on a page whose opposite sides meet ([`Ring`]). Widths are tried around the square's;
+//! each is given the height with which it would beat the best page so far.
 
-use super::bits::BitGrid;
-
-/// A shape on the cell grid: rows of runs.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Shape {
-    /// Columns and rows of the bounding box.
-    pub size: [usize; 2],
-    /// `row, start, end` in cells from the bounding box's corner, by row, then start.
-    pub runs: Vec<[u32; 3]>,
-}
-
-impl Shape {
-    /// The shape of a grid's set cells; empty rows and columns around them stay.
-    pub fn of(grid: &BitGrid) -> Self {
-        let runs = (0..grid.height())
-            .flat_map(|y| grid.runs(y).map(move |(from, to)| [y as u32, from as u32, to as u32]))
-            .collect();
-        Self { size: [grid.width(), grid.height()], runs }
-    }
-
-    /// The number of cells.
-    pub fn area(&self) -> usize {
-        self.runs.iter().map(|[_, start, end]| (end - start) as usize).sum()
-    }
-
-    /// The shape on a grid `factor` times as coarse, whole cells for parts of them.
-    fn coarser(&self, factor: usize) -> Shape {
-        if factor == 1 {
-            return self.clone();
-        }
-        let factor = factor as u32;
-        let size = self.size.map(|side| side.div_ceil(factor as usize));
-        let mut runs: Vec<[u32; 3]> = self
-            .runs
-            .iter()
-            .map(|[row, start, end]| [row / factor, start / factor, end.div_ceil(factor)])
-            .collect();
-        runs.sort_unstable();
-        let mut merged: Vec<[u32; 3]> = Vec::with_capacity(runs.len());
-        for run in runs {
-            match merged.last_mut() {
-                Some(last) if last[0] == run[0] && run[1] <= last[2] => {
-                    last[2] = last[2].max(run[2])
-                }
-                _ => merged.push(run),
-            }
-        }
-        Shape { size, runs: merged }
-    }
-}
+use super::open_page;
+use super::ring::{self, Piece, Ring};
+use super::shape::Shape;
 
 /// Where a shape's bounding box lies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Placement {
     pub page: usize,
     pub x: usize,
     pub y: usize,
+    /// True where the shape's columns became rows.
+    pub turned: bool,
 }
 
 /// Where all shapes lie.
@@ -69,6 +25,8 @@ pub(crate) struct Packing {
     pub placements: Vec<Placement>,
     /// Columns and rows of each page.
     pub pages: Vec<[usize; 2]>,
+    /// True where shapes leave the only page on one side and come back on the other.
+    pub wraps: bool,
 }
 
 impl Packing {
@@ -78,252 +36,149 @@ impl Packing {
     }
 }
 
-/// Pages wider than this are packed on a coarser grid: the search grows with the square.
-const MAX_COLUMNS: usize = 384;
+/// Pages whose square is wider than this are packed on a coarser grid.
+const WIDEST_SQUARE: usize = 96;
 
-/// Widths that are tried, relative to the side of a square of the shapes' area.
-const WIDTHS: [f64; 9] = [1.0, 0.94, 1.06, 1.12, 0.85, 1.2, 0.75, 1.35, 1.6];
+/// The square's side over the least width that is tried; the greatest is as much above.
+const SPREAD: f64 = 2.0;
 
-/// Packs shapes into pages of at most `max` cells a side; one page where they fit, as near to a
-/// square as wastes least. `None` where a shape is larger than a page.
-pub(crate) fn pack(shapes: &[&Shape], max: usize) -> Option<Packing> {
+/// The search ends at a page that is larger than its shapes by no more than this.
+const GOOD: f64 = 1.03;
+
+/// Shapes placed over all widths, about: with many shapes fewer widths are tried, as they fill
+/// any page alike.
+const EFFORT: usize = 300;
+
+/// Widths that are tried at least.
+const LEAST_WIDTHS: usize = 8;
+
+/// Packs shapes into pages of at most `max` cells a side; one page where they fit, as small as is
+/// found. `None` where a shape is larger than a page. Sides of a page that wraps are multiples of
+/// `multiple`.
+pub(crate) fn pack(shapes: &[&Shape], max: usize, multiple: usize) -> Option<Packing> {
     let widest = shapes.iter().map(|shape| shape.size[0]).max().unwrap_or(1);
     let tallest = shapes.iter().map(|shape| shape.size[1]).max().unwrap_or(1);
     if widest > max || tallest > max {
         return None;
     }
-    if let [shape] = shapes {
-        let placements = vec![Placement { page: 0, x: 0, y: 0 }];
-        return Some(Packing { placements, pages: vec![shape.size] });
-    }
     let area: usize = shapes.iter().map(|shape| shape.area()).sum();
     let side = (area as f64).sqrt();
+    let narrowest = shapes.iter().map(|shape| shape.size[0].min(shape.size[1])).max().unwrap_or(1);
     let mut factor = 1;
-    while (side / factor as f64) > MAX_COLUMNS as f64 {
+    while side as usize > WIDEST_SQUARE * factor || narrowest > ring::MAX_COLUMNS * factor {
         factor *= 2;
     }
     let coarse: Vec<Shape> = shapes.iter().map(|shape| shape.coarser(factor)).collect();
-    let order = order(&coarse);
-    let max = (max / factor).max(1);
-    let widest = widest.div_ceil(factor).min(max);
-    let side = side / factor as f64;
-
-    let mut best: Option<Packing> = None;
-    let mut tried = Vec::new();
-    for relative in WIDTHS {
-        let width = ((side * relative).ceil() as usize).clamp(widest, max);
-        if tried.contains(&width) {
-            continue;
-        }
-        tried.push(width);
-        let limit = best.as_ref().map_or(usize::MAX, |best| best.area() / width);
-        if let Some(packing) = one_page(&coarse, &order, width, max.min(limit)) {
-            let better = best.as_ref().is_none_or(|best| packing.area() < best.area());
-            if better {
-                best = Some(packing);
-            }
-        }
-    }
-    let mut packing = match best {
+    let mut order: Vec<usize> = (0..shapes.len()).collect();
+    order.sort_by_key(|index| {
+        let [width, height] = coarse[*index].size;
+        std::cmp::Reverse((coarse[*index].area(), width * height))
+    });
+    let limit = max / factor;
+    let found = one_page(&coarse, &order, limit, multiple.div_ceil(factor));
+    let mut packing = match found {
         Some(packing) => packing,
-        None => many_pages(&coarse, &order, max)?,
+        None => open_page::pack(&coarse, &order, limit.max(1))?,
     };
     for placement in &mut packing.placements {
         placement.x *= factor;
         placement.y *= factor;
     }
-    // Coarse cells may stand out over what the shapes need.
-    for (page, size) in packing.pages.iter_mut().enumerate() {
-        *size = [0; 2];
-        for (placement, shape) in packing.placements.iter().zip(shapes) {
-            if placement.page == page {
-                size[0] = size[0].max(placement.x + shape.size[0]);
-                size[1] = size[1].max(placement.y + shape.size[1]);
-            }
-        }
-    }
+    packing.pages.iter_mut().flatten().for_each(|side| *side *= factor);
+    packing.trim(shapes);
     Some(packing)
 }
 
-/// Largest first; what is equal stays in the order given.
-fn order(shapes: &[Shape]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..shapes.len()).collect();
-    order.sort_by_key(|index| {
-        let [width, height] = shapes[*index].size;
-        std::cmp::Reverse((width.max(height), width * height))
-    });
-    order
-}
-
-/// All shapes on one page of at most this size, or `None`.
-fn one_page(shapes: &[Shape], order: &[usize], width: usize, height: usize) -> Option<Packing> {
-    let mut page = Page::new(width);
-    let mut placements = vec![Placement { page: 0, x: 0, y: 0 }; shapes.len()];
-    for index in order {
-        let (x, y) = page.place(&shapes[*index], height)?;
-        placements[*index] = Placement { page: 0, x, y };
-    }
-    Some(Packing { placements, pages: vec![page.used] })
-}
-
-/// Fills one page of the largest size after the other.
-fn many_pages(shapes: &[Shape], order: &[usize], max: usize) -> Option<Packing> {
-    let mut pages: Vec<Page> = Vec::new();
-    let mut placements = vec![Placement { page: 0, x: 0, y: 0 }; shapes.len()];
-    for index in order {
-        let shape = &shapes[*index];
-        let found = pages
-            .iter_mut()
-            .enumerate()
-            .find_map(|(number, page)| page.place(shape, max).map(|place| (number, place)));
-        let (number, (x, y)) = match found {
-            Some(found) => found,
-            None => {
-                let mut page = Page::new(max);
-                let place = page.place(shape, max)?;
-                pages.push(page);
-                (pages.len() - 1, place)
+impl Packing {
+    /// Finds out whether shapes go over the sides; where none does, pages end with their shapes.
+    fn trim(&mut self, shapes: &[&Shape]) {
+        let mut used = vec![[0; 2]; self.pages.len()];
+        for (placement, shape) in self.placements.iter().zip(shapes) {
+            let [mut width, mut height] = shape.size;
+            if placement.turned {
+                (width, height) = (height, width);
             }
+            let used = &mut used[placement.page];
+            *used = [used[0].max(placement.x + width), used[1].max(placement.y + height)];
+        }
+        self.wraps =
+            used.iter().zip(&self.pages).any(|(used, page)| used[0] > page[0] || used[1] > page[1]);
+        if !self.wraps {
+            self.pages = used;
+        }
+    }
+}
+
+/// The smallest page that is found, of at most `max` cells a side and multiples of `multiple`.
+fn one_page(shapes: &[Shape], order: &[usize], max: usize, multiple: usize) -> Option<Packing> {
+    let cells: usize = shapes.iter().map(Shape::area).sum();
+    let pieces: Vec<[Piece; 2]> =
+        shapes.iter().map(|shape| [Piece::new(shape), Piece::new(&shape.turned())]).collect();
+    let max = max / multiple;
+    let side = (cells.max(1) as f64).sqrt() / multiple as f64;
+    let widest = max.min(ring::MAX_COLUMNS / multiple);
+    let low = ((side / SPREAD) as usize).clamp(1, widest.max(1));
+    let high = ((side * SPREAD) as usize + 1).min(widest);
+    let count = (EFFORT / shapes.len().max(1)).max(LEAST_WIDTHS);
+    let middle = side.round() as usize;
+    let mut widths: Vec<usize> =
+        (low..=high).step_by(((high + 1).saturating_sub(low) / count).max(1)).collect();
+    widths.sort_by_key(|width| width.abs_diff(middle));
+
+    // All in multiples from here on.
+    let unit = multiple * multiple;
+    let mut best: Option<([usize; 2], Vec<Placement>)> = None;
+    for width in widths {
+        let least = cells.div_ceil(width * unit).max(1);
+        let mut most = match &best {
+            Some(([columns, rows], _)) => (columns * rows - 1) / width,
+            None => 2 * least + 2,
+        }
+        .min(max);
+        // Where the height that would be better fails, so do lesser ones.
+        let mut height = if best.is_some() { most } else { most.min(least + least / 8) };
+        let mut fails = least - 1;
+        while fails < most && height >= least {
+            match place_all(&pieces, order, [width * multiple, height * multiple]) {
+                Some(placements) => {
+                    best = Some(([width, height], placements));
+                    most = height - 1;
+                }
+                None => fails = height,
+            }
+            height = fails + 1 + most.saturating_sub(fails + 1) / 2;
+        }
+        if let Some(([columns, rows], _)) = &best
+            && (columns * rows * unit) as f64 <= GOOD * cells as f64
+        {
+            break;
+        }
+    }
+    let (size, placements) = best?;
+    Some(Packing { placements, pages: vec![size.map(|side| side * multiple)], wraps: true })
+}
+
+/// Places all pieces on one page of this size, or `None`.
+fn place_all(pieces: &[[Piece; 2]], order: &[usize], size: [usize; 2]) -> Option<Vec<Placement>> {
+    let mut ring = Ring::new(size[0], size[1]);
+    let mut placements = vec![Placement::default(); pieces.len()];
+    for (placed, index) in order.iter().enumerate() {
+        let [upright, turned] = &pieces[*index];
+        let first = ring.find(upright, size[1]);
+        let ends = first.map_or(usize::MAX, |place| place[1] + upright.size[1]);
+        // Turned where it then ends further up.
+        let second = ring.find(turned, ends.saturating_sub(turned.size[1]).min(size[1]));
+        let (place, turned) = match (first, second) {
+            (_, Some(place)) => (place, true),
+            (Some(place), None) => (place, false),
+            (None, None) => return None,
         };
-        placements[*index] = Placement { page: number, x, y };
-    }
-    Some(Packing { placements, pages: pages.into_iter().map(|page| page.used).collect() })
-}
-
-/// A page being filled.
-struct Page {
-    width: usize,
-    stride: usize,
-    /// Occupied cells; bits beyond the width are set.
-    rows: Vec<u64>,
-    /// Rows above this one (towards 0) have no free cell.
-    first_free: usize,
-    used: [usize; 2],
-    blocked: Vec<u64>,
-    scratch: Vec<u64>,
-}
-
-impl Page {
-    fn new(width: usize) -> Self {
-        let stride = width.div_ceil(64);
-        Self {
-            width,
-            stride,
-            rows: Vec::new(),
-            first_free: 0,
-            used: [0; 2],
-            blocked: vec![0; stride],
-            scratch: vec![0; stride],
+        if placed + 1 < order.len() {
+            ring.put(&pieces[*index][usize::from(turned)], place);
         }
+        placements[*index] = Placement { page: 0, x: place[0], y: place[1], turned };
     }
-
-    fn height(&self) -> usize {
-        self.rows.len() / self.stride
-    }
-
-    fn grow(&mut self, height: usize) {
-        while self.height() < height {
-            let start = self.rows.len();
-            self.rows.resize(start + self.stride, 0);
-            if !self.width.is_multiple_of(64) {
-                self.rows[start + self.stride - 1] = !0 << (self.width % 64);
-            }
-        }
-    }
-
-    /// Puts the shape at its lowest, then leftmost place; `None` where it would end below `max`
-    /// rows.
-    fn place(&mut self, shape: &Shape, max: usize) -> Option<(usize, usize)> {
-        if shape.size[0] > self.width {
-            return None;
-        }
-        let mut y = self.first_free;
-        while y + shape.size[1] <= max {
-            self.grow(y + shape.size[1]);
-            if let Some(x) = self.fit(shape, y) {
-                for [row, start, end] in &shape.runs {
-                    let row = (y + *row as usize) * self.stride;
-                    let row = &mut self.rows[row..row + self.stride];
-                    set(row, x + *start as usize, x + *end as usize);
-                }
-                self.used[0] = self.used[0].max(x + shape.size[0]);
-                self.used[1] = self.used[1].max(y + shape.size[1]);
-                while self.first_free < self.height()
-                    && self.rows[self.first_free * self.stride..][..self.stride]
-                        .iter()
-                        .all(|word| *word == !0)
-                {
-                    self.first_free += 1;
-                }
-                return Some((x, y));
-            }
-            y += 1;
-        }
-        None
-    }
-
-    /// The leftmost column where the shape fits at row `y`.
-    fn fit(&mut self, shape: &Shape, y: usize) -> Option<usize> {
-        self.blocked.fill(0);
-        for [row, start, end] in &shape.runs {
-            let row = (y + *row as usize) * self.stride;
-            self.scratch.copy_from_slice(&self.rows[row..row + self.stride]);
-            // Bit x: some cell of x..x + length is occupied; doubling the length each time.
-            let length = (end - start) as usize;
-            let mut reached = 1;
-            while reached < length {
-                let by = reached.min(length - reached);
-                or_shifted(&mut self.scratch, by);
-                reached += by;
-            }
-            let mut all = !0;
-            for (word, blocked) in self.blocked.iter_mut().enumerate() {
-                *blocked |= shifted(&self.scratch, word, *start as usize);
-                all &= *blocked;
-            }
-            if all == !0 {
-                return None;
-            }
-        }
-        self.blocked
-            .iter()
-            .position(|word| *word != !0)
-            .map(|word| word * 64 + (!self.blocked[word]).trailing_zeros() as usize)
-    }
-}
-
-/// A word of the row shifted towards 0; what comes in from beyond the page is occupied.
-fn shifted(row: &[u64], word: usize, by: usize) -> u64 {
-    let (words, bits) = (by / 64, by % 64);
-    let low = row.get(word + words).copied().unwrap_or(!0);
-    if bits == 0 {
-        return low;
-    }
-    let high = row.get(word + words + 1).copied().unwrap_or(!0);
-    low >> bits | high << (64 - bits)
-}
-
-/// `row |= row >> by`.
-fn or_shifted(row: &mut [u64], by: usize) {
-    // Words are read at or above the one that is written, so upwards is in place.
-    for word in 0..row.len() {
-        row[word] |= shifted(row, word, by);
-    }
-}
-
-/// Sets `start..end`, which is not empty.
-fn set(row: &mut [u64], start: usize, end: usize) {
-    let (first, last) = (start / 64, (end - 1) / 64);
-    for (word, bits) in row.iter_mut().enumerate().take(last + 1).skip(first) {
-        let mut mask = !0u64;
-        if word == first {
-            mask &= !0 << (start % 64);
-        }
-        if word == last {
-            mask &= !0 >> (63 - (end - 1) % 64);
-        }
-        *bits |= mask;
-    }
+    Some(placements)
 }
 
 #[cfg(test)]
@@ -352,13 +207,18 @@ mod tests {
         let mut pages: Vec<Vec<bool>> =
             packing.pages.iter().map(|[w, h]| vec![false; w * h]).collect();
         assert!(packing.pages.iter().all(|[w, h]| *w <= max && *h <= max));
+        let on_page = |at: usize, side: usize| {
+            assert!(at < side || packing.wraps);
+            at % side
+        };
         for (shape, placement) in shapes.iter().zip(&packing.placements) {
-            let [width, _] = packing.pages[placement.page];
+            let [width, height] = packing.pages[placement.page];
             for [row, start, end] in &shape.runs {
                 for x in *start..*end {
-                    assert!(placement.x + (x as usize) < width);
-                    let cell = (placement.y + *row as usize) * width + placement.x + x as usize;
-                    let cell = &mut pages[placement.page][cell];
+                    let (x, y) = if placement.turned { (*row, x) } else { (x, *row) };
+                    let x = on_page(placement.x + x as usize, width);
+                    let y = on_page(placement.y + y as usize, height);
+                    let cell = &mut pages[placement.page][y * width + x];
                     assert!(!*cell, "two shapes share a cell");
                     *cell = true;
                 }
@@ -381,7 +241,7 @@ mod tests {
                 })
                 .collect();
             let max = if round % 2 == 0 { 4096 } else { 100 };
-            check(&shapes, &pack(&refs(&shapes), max).expect("fits"), max);
+            check(&shapes, &pack(&refs(&shapes), max, 1 + round % 2).expect("fits"), max);
         }
     }
 
@@ -389,7 +249,7 @@ mod tests {
     fn shapes_nest_where_boxes_would_not() {
         // Two corners fill a rectangle with a block in their notches.
         let shapes = [corner(8), block(4, 4), corner(8), block(4, 4)];
-        let packing = pack(&refs(&shapes), 64).expect("fits");
+        let packing = pack(&refs(&shapes), 64, 1).expect("fits");
         check(&shapes, &packing, 64);
         assert!(packing.area() <= 8 * 16 + 16, "{:?}", packing.pages);
     }
@@ -397,17 +257,35 @@ mod tests {
     #[test]
     fn large_sets_go_to_a_coarser_grid_and_several_pages() {
         let shapes: Vec<Shape> = (0..60).map(|i| block(150 + i, 130 + i)).collect();
-        let one = pack(&refs(&shapes), 4096).expect("fits");
+        let one = pack(&refs(&shapes), 4096, 1).expect("fits");
         check(&shapes, &one, 4096);
         assert_eq!(one.pages.len(), 1);
-        let many = pack(&refs(&shapes), 400).expect("fits");
+        let many = pack(&refs(&shapes), 400, 1).expect("fits");
         check(&shapes, &many, 400);
         assert!(many.pages.len() > 10);
-        assert_eq!(pack(&refs(&shapes), 200), None);
+        assert_eq!(pack(&refs(&shapes), 200, 1), None);
+    }
+
+    #[test]
+    fn long_strips_fit_a_page_of_their_length() {
+        let shapes = [block(1000, 3), block(900, 3), block(3, 3)];
+        let packing = pack(&refs(&shapes), 2048, 2).expect("fits");
+        check(&shapes, &packing, 2048);
+        assert!(packing.area() <= 9 * 1000, "{:?}", packing.pages);
+    }
+
+    #[test]
+    fn slanted_shapes_need_little_more_than_their_cells() {
+        let runs: Vec<[u32; 3]> = (0..40).map(|row| [row, row / 2, row / 2 + 60]).collect();
+        let shapes = vec![Shape { size: [79, 40], runs }; 2];
+        let packing = pack(&refs(&shapes), 4096, 2).expect("fits");
+        check(&shapes, &packing, 4096);
+        assert!(packing.wraps && packing.pages[0].iter().all(|side| side % 2 == 0));
+        assert!(packing.area() <= 2 * 40 * 60 * 21 / 20, "{:?}", packing.pages);
     }
 
     #[test]
     fn nothing_packs_to_nothing() {
-        assert_eq!(pack(&[], 10).map(|packing| packing.area()), Some(0));
+        assert_eq!(pack(&[], 10, 2).map(|packing| packing.area()), Some(0));
     }
 }

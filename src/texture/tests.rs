@@ -59,6 +59,17 @@ fn sample(texel: impl Fn(usize, usize) -> [f64; 3], size: [usize; 2], at: [f64; 
     result
 }
 
+/// Bilinear sampling of a page, over its sides where these meet.
+fn sample_page(page: &Page, wraps: bool, at: [f64; 2]) -> [f64; 3] {
+    if !wraps {
+        return sample(of_page(page), page.size, at);
+    }
+    let texel = |x: usize, y: usize| of_page(page)(x % page.size[0], y % page.size[1]);
+    let size = page.size.map(|side| side * 1000);
+    // Far from the origin, so that repetition needs no negative numbers.
+    sample(texel, size, [0, 1].map(|axis| at[axis] + 100.0 * page.size[axis] as f64))
+}
+
 fn of_page(page: &Page) -> impl Fn(usize, usize) -> [f64; 3] + '_ {
     |x, y| {
         let texel = &page.pixels[(y * page.size[0] + x) * 3..];
@@ -113,7 +124,7 @@ fn inside([a, b, c]: [[f64; 2]; 3], random: &mut Random) -> [f64; 2] {
 
 fn place(atlas: &Atlas, triangle: usize, at: [f64; 2]) -> (usize, [f64; 2]) {
     let place = atlas.places[atlas.patches[0][triangle] as usize];
-    (place.page, [at[0] + place.shift[0], at[1] + place.shift[1]])
+    (place.page, place.texel(at))
 }
 
 #[test]
@@ -134,7 +145,7 @@ fn sampling_the_atlas_equals_sampling_the_source() {
                 let page = &atlas.pages[page];
                 assert!(page.size.iter().all(|side| side % 4 == 0 && *side <= max_side));
                 let expected = sample(of_level(&level), level.size, at);
-                let found = sample(of_page(page), page.size, moved);
+                let found = sample_page(page, atlas.wraps, moved);
                 // Only the position's rounding differs.
                 let error = (0..3).map(|c| (found[c] - expected[c]).abs()).fold(0.0, f64::max);
                 assert!(error < 1e-9, "{found:?}, not {expected:?} at {at:?}");
@@ -167,7 +178,8 @@ fn mips_that_the_cell_promises_show_no_neighbour() {
                     let expected =
                         if at[0] < 128.0 { [255.0, 0.0, 0.0] } else { [0.0, 0.0, 255.0] };
                     let (_, moved) = place(&atlas, triangle, at);
-                    let found = sample(of_page(&page), page.size, moved.map(|value| value * scale));
+                    let moved = moved.map(|value| value * scale);
+                    let found = sample_page(&page, atlas.wraps, moved);
                     let error = (0..3).map(|c| (found[c] - expected[c]).abs()).fold(0.0, f64::max);
                     assert!(error < 1e-6, "cell {cell}, mip {mip}: {found:?} at {at:?}");
                 }
@@ -333,7 +345,8 @@ fn difference(scene: &Scene, node: &TexturedNode, source: &Picture) -> f64 {
                 // Far from the origin, so that repetition needs no negative numbers.
                 let shifted = [0, 1].map(|axis| at_old[axis] + 8.0 * size[axis] as f64);
                 let expected = sample(texel, size.map(|side| side * 100), shifted);
-                let found = sample(of_page(&page), page.size, at_new);
+                let wraps = primitive.surface.wrap == [Wrap::Repeat; 2];
+                let found = sample_page(&page, wraps, at_new);
                 for channel in 0..3 {
                     greatest = greatest.max((found[channel] - expected[channel]).abs());
                 }
