@@ -84,6 +84,13 @@ impl GpuPicture {
         self.bindings.push((wrap, binding));
     }
 
+    /// What drivers that compile for the picture at hand tell apart: whether its sides are powers
+    /// of two, and whether it has more than one level.
+    pub fn kind(&self) -> [bool; 3] {
+        let (width, height) = (self.texture.width(), self.texture.height());
+        [width.is_power_of_two(), height.is_power_of_two(), self.texture.mip_level_count() > 1]
+    }
+
     /// What draws bind, once it was prepared.
     pub fn binding(&self, wrap: [Wrap; 2]) -> Option<&BindGroup> {
         self.bindings.iter().find(|(found, _)| *found == wrap).map(|(_, binding)| binding)

@@ -29,6 +29,8 @@ mod renderer;
 mod samplers;
 #[cfg(feature = "render")]
 mod target;
+#[cfg(feature = "render")]
+mod warm_up;
 
 #[cfg(feature = "render")]
 pub use adapter::{AdapterLabel, adapters};

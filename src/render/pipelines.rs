@@ -18,7 +18,7 @@ use super::options::{RenderOptions, Shading};
 use super::target::{COLOR_FORMAT, DEPTH_FORMAT};
 
 /// What divides the ways to draw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct PipelineKey {
     textured: bool,
     /// 0 opaque, 1 mask, 2 screen.

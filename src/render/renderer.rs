@@ -20,6 +20,7 @@ use super::options::RenderOptions;
 use super::pipelines::Pipelines;
 use super::samplers::Samplers;
 use super::target::Target;
+use super::warm_up::WarmUp;
 use crate::camera::Pose;
 use crate::{Error, Result};
 
@@ -43,6 +44,7 @@ pub struct Renderer {
     target: Target,
     pipelines: Pipelines,
     samplers: Samplers,
+    warm_up: WarmUp,
     camera: Buffer,
     camera_binding: BindGroup,
     instances: Buffer,
@@ -99,6 +101,7 @@ impl Renderer {
         device.check()?;
         Ok(Self {
             options: options.clone(),
+            warm_up: WarmUp::new(&device),
             device,
             target,
             pipelines,
@@ -126,6 +129,9 @@ impl Renderer {
 
     /// Copies a node's content to the graphics card; one that was there under this index gives
     /// way. `level` is the node's, for its tint.
+    ///
+    /// The first node of its kind takes longer, as the driver compiles for it. Shared pictures
+    /// should come before the nodes that use them: otherwise a frame waits for that.
     pub fn upload(&mut self, node: u32, level: u32, content: &Content) -> Result<()> {
         self.remove(node);
         let Self { device, pipelines, samplers, options, .. } = self;
@@ -133,7 +139,23 @@ impl Renderer {
         let held = GpuNode::new(gpu, queue, pipelines, samplers, options, level, content);
         self.bytes += held.bytes;
         self.nodes.insert(node, held);
-        self.start_copies().inspect_err(|_| self.remove(node))
+        self.start_copies().and_then(|()| self.warm_up(node)).inspect_err(|_| self.remove(node))
+    }
+
+    /// Has the driver compile now what the node needs and none before it did.
+    fn warm_up(&mut self, node: u32) -> Result<()> {
+        let Some(held) = self.nodes.get(&node) else { return Ok(()) };
+        let layout = &self.pipelines.picture_layout;
+        for draw in &held.draws {
+            if let DrawPicture::Shared(texture) = draw.picture
+                && let Some(picture) = self.shared.get_mut(&texture)
+            {
+                picture.prepare(&self.device.device, layout, &mut self.samplers, draw.wrap);
+            }
+        }
+        let (camera, instances) = (&self.camera_binding, &self.instances);
+        let shared = |texture: u32| self.shared.get(&texture);
+        self.warm_up.node(&self.device, &self.pipelines, camera, instances, held, shared)
     }
 
     /// Copies a shared picture to the graphics card; one that was there under this index gives

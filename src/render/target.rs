@@ -49,6 +49,11 @@ impl Target {
         }
     }
 
+    /// A few pixels to try things on.
+    pub fn tiny(device: &Device) -> Self {
+        Self::new(device, [8, 8], [0; 3])
+    }
+
     /// Bytes of the colour and the depth of all pixels.
     pub fn bytes(&self) -> u64 {
         u64::from(self.size[0]) * u64::from(self.size[1]) * 8
