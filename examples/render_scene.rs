@@ -10,6 +10,7 @@
 
 use std::error::Error;
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use hlod::camera::{Pose, looking_at, up_vector};
@@ -81,25 +82,38 @@ fn upload(
         textures.find(|(texture, _)| texture.file_name == name).map(|(_, index)| index)
     };
     let mut foretold = 0;
-    let mut textures: Vec<u32> = Vec::new();
-    for &index in front {
-        let node = &scene.nodes[index as usize];
-        let file = arguments.out.join(NODES_DIR).join(&node.file);
-        let content = Content::decode(&file, &std::fs::read(&file)?, shared)?;
-        foretold += held_bytes(node.vertices, node.triangles, &node.pictures);
-        renderer.upload(index, node.level, &content)?;
-        textures.extend(&node.shared_textures);
-    }
+    let nodes = || front.iter().map(|&index| (index, &scene.nodes[index as usize]));
+    let mut textures: Vec<u32> =
+        nodes().flat_map(|(_, node)| &node.shared_textures).copied().collect();
     textures.sort();
     textures.dedup();
+    let (mut decoding, mut uploading) = (Duration::ZERO, Duration::ZERO);
     for index in textures {
         let texture = &scene.shared_textures[index as usize];
         let file = arguments.out.join(TEXTURES_DIR).join(&texture.file_name);
         let size = [texture.width, texture.height];
-        renderer.upload_shared(index, &Picture::decode(&file, &std::fs::read(&file)?, size)?)?;
+        let begin = Instant::now();
+        let picture = Picture::decode(&file, &std::fs::read(&file)?, size)?;
+        let decoded = Instant::now();
+        renderer.upload_shared(index, &picture)?;
+        decoding += decoded - begin;
+        uploading += decoded.elapsed();
         foretold += picture_bytes(texture.width, texture.height);
     }
+    for (index, node) in nodes() {
+        let file = arguments.out.join(NODES_DIR).join(&node.file);
+        let begin = Instant::now();
+        let content = Content::decode(&file, &std::fs::read(&file)?, shared)?;
+        let decoded = Instant::now();
+        renderer.upload(index, node.level, &content)?;
+        decoding += decoded - begin;
+        uploading += decoded.elapsed();
+        foretold += held_bytes(node.vertices, node.triangles, &node.pictures);
+    }
+    let begin = Instant::now();
     renderer.finish_uploads()?;
+    uploading += begin.elapsed();
+    println!("{decoding:.1?} to read and decode, {uploading:.1?} to upload");
     if renderer.gpu_bytes() != foretold {
         return Err(format!("{foretold} bytes foretold, {} taken", renderer.gpu_bytes()).into());
     }
@@ -108,14 +122,23 @@ fn upload(
 
 /// The camera, and its near plane.
 fn pose(scene: &Scene, arguments: &Arguments) -> Result<(Pose, f32)> {
-    let [low, high] = scene.bounds().ok_or("the scene has no nodes")?.map(DVec3::from);
-    let size = (high - low).length();
-    let at = arguments.at.unwrap_or((low + high) / 2.0);
-    let sky = up_vector(scene.up);
+    let bounds = scene.bounds().ok_or("the scene has no nodes")?.map(DVec3::from);
+    let middle = (bounds[0] + bounds[1]) / 2.0;
+    let size = (bounds[1] - bounds[0]).length();
+    let at = arguments.at.unwrap_or(middle);
     let south = if scene.up == UpAxis::Z { DVec3::NEG_Y } else { DVec3::Z };
-    // Far enough for the ball around the scene, or as near as most scenes are flat.
-    let away = size * 0.45 / (arguments.fov_y_deg.to_radians() / 2.0).tan();
-    let overview = at + (south * 0.8 + sky * 0.6) * away;
+    let ahead = -(south * 0.75 + up_vector(scene.up) * 0.6).normalize();
+    // As near as all corners of the scene are in the picture.
+    let rotation = looking_at(scene.up, DVec3::ZERO, ahead).ok_or("no direction")?;
+    let half_height = (arguments.fov_y_deg.to_radians() / 2.0).tan();
+    let [width, height] = arguments.options.size.map(f64::from);
+    let away = (0..8).map(|corner| {
+        let side = |axis: usize| bounds[corner >> axis & 1][axis];
+        let seen = rotation.inverse() * (DVec3::new(side(0), side(1), side(2)) - at);
+        let high = seen.y.abs() / half_height;
+        seen.z + high.max(seen.x.abs() / half_height * height / width)
+    });
+    let overview = at - ahead * away.fold(0.0, f64::max);
     let position = arguments.from.unwrap_or(overview);
     let rotation =
         looking_at(scene.up, position, at).ok_or("--from and --at are the same place")?;

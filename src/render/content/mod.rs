@@ -25,7 +25,7 @@ use crate::{Error, Result};
 /// The corners of triangles as indices into the vertices: 16 bits where they suffice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Indices {
-    /// At most [`held::MOST_SHORT_VERTICES`] vertices.
+    /// At most 65,536 vertices.
     Short(Vec<u16>),
     /// More.
     Long(Vec<u32>),

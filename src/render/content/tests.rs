@@ -168,7 +168,7 @@ fn grey_and_deep_pictures_are_drawn_too() {
 #[test]
 fn pictures_that_are_cut_short_or_damaged_are_refused_by_name() {
     let refused = |bytes: &[u8], size| {
-        let error = Picture::decode(Path::new(FILE), bytes, size).err().expect("a refusal");
+        let error = Picture::decode(Path::new(FILE), bytes, size).unwrap_err();
         assert_eq!(error.exit_code(), 3);
         let text = error.to_string();
         assert!(text.contains(FILE), "{text}");
