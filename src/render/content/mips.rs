@@ -10,13 +10,15 @@ type Texel = [u16; 4];
 /// Fills all levels from the first; `levels` has room for them.
 pub(super) fn fill(width: u32, height: u32, levels: &mut [u8]) {
     let (first, mut rest) = levels.split_at_mut(level_bytes([width, height]) as usize);
+    let opaque = first.as_chunks::<4>().0.iter().all(|texel| texel[3] == 255);
     let mut size = [width as usize, height as usize];
     let mut source = Source::Bytes(first.as_chunks().0);
     for half in level_sizes(width, height).skip(1) {
         let (level, after) = rest.split_at_mut(level_bytes(half) as usize);
         rest = after;
         let half = half.map(|side| side as usize);
-        let linear = halve(&source, size, half);
+        let linear =
+            if opaque { halve_opaque(&source, size, half) } else { halve(&source, size, half) };
         encode(&linear, level.as_chunks_mut().0);
         source = Source::Linear(linear);
         size = half;
@@ -56,23 +58,56 @@ fn encode(linear: &[Texel], bytes: &mut [[u8; 4]]) {
     }
 }
 
+/// As [`halve`] where every texel weighs the same: first down, then across.
+fn halve_opaque(source: &Source<'_>, size: [usize; 2], half: [usize; 2]) -> Vec<Texel> {
+    let mut row = vec![[0u16; 4]; size[0]];
+    let mut sums = vec![[0f32; 4]; size[0]];
+    let mut result = Vec::with_capacity(half[0] * half[1]);
+    let columns: Vec<Taps> = (0..half[0]).map(|x| taps(x, size[0], half[0])).collect();
+    let even = size[0] == 2 * half[0];
+    let rounded = |sum: [f32; 4]| sum.map(|sum| (sum + 0.5) as u16);
+    for y in 0..half[1] {
+        let down = taps(y, size[1], half[1]);
+        sums.fill([0.0; 4]);
+        for (tap, weight) in down.weights[..down.count].iter().enumerate() {
+            source.read(down.first + tap, &mut row);
+            for (sum, texel) in sums.iter_mut().zip(&row) {
+                for channel in 0..4 {
+                    sum[channel] += f32::from(texel[channel]) * weight;
+                }
+            }
+        }
+        if even {
+            let pairs = sums.as_chunks::<2>().0.iter();
+            result.extend(pairs.map(|[a, b]| {
+                rounded(std::array::from_fn(|channel| (a[channel] + b[channel]) * 0.5))
+            }));
+        } else {
+            result.extend(columns.iter().map(|across| {
+                let mut mean = [0.0; 4];
+                let texels = &sums[across.first..][..across.count];
+                for (texel, weight) in texels.iter().zip(across.weights) {
+                    for channel in 0..4 {
+                        mean[channel] += texel[channel] * weight;
+                    }
+                }
+                rounded(mean)
+            }));
+        }
+    }
+    result
+}
+
 fn halve(source: &Source<'_>, size: [usize; 2], half: [usize; 2]) -> Vec<Texel> {
     let mut rows = [(); 3].map(|()| vec![[0u16; 4]; size[0]]);
     let mut result = Vec::with_capacity(half[0] * half[1]);
     let columns: Vec<Taps> = (0..half[0]).map(|x| taps(x, size[0], half[0])).collect();
-    let even = size.map(|side| side.is_multiple_of(2)) == [true; 2];
     for y in 0..half[1] {
         let down = taps(y, size[1], half[1]);
         for (row, tap) in rows.iter_mut().zip(0..down.count) {
             source.read(down.first + tap, row);
         }
-        if even {
-            let [above, below, _] = &rows;
-            let pairs = above.as_chunks::<2>().0.iter().zip(below.as_chunks::<2>().0);
-            result.extend(pairs.map(|(&[a, b], &[c, d])| mean_of_four([a, b, c, d])));
-        } else {
-            result.extend(columns.iter().map(|across| mean(&rows, &down, across)));
-        }
+        result.extend(columns.iter().map(|across| mean(&rows, &down, across)));
     }
     result
 }
@@ -98,15 +133,6 @@ fn taps(index: usize, size: usize, half: usize) -> Taps {
     }
 }
 
-fn mean_of_four(texels: [Texel; 4]) -> Texel {
-    let [a, b, c, d] = texels;
-    if a[3] == b[3] && a[3] == c[3] && a[3] == d[3] {
-        let sum = |i: usize| u32::from(a[i]) + u32::from(b[i]) + u32::from(c[i]) + u32::from(d[i]);
-        return [0, 1, 2].map(|i| ((sum(i) + 2) / 4) as u16).into_texel(a[3]);
-    }
-    weighted(texels.iter().map(|texel| (texel, 0.25)))
-}
-
 fn mean(rows: &[Vec<Texel>; 3], down: &Taps, across: &Taps) -> Texel {
     let rows = rows.iter().zip(down.weights).take(down.count);
     weighted(rows.flat_map(|(row, down)| {
@@ -126,17 +152,8 @@ fn weighted<'a>(texels: impl Iterator<Item = (&'a Texel, f32)> + Clone) -> Texel
             sum[channel] += f32::from(texel[channel]) * part;
         }
     }
-    sum.map(|sum| sum as u16).into_texel((alpha + 0.5) as u16)
-}
-
-trait IntoTexel {
-    fn into_texel(self, alpha: u16) -> Texel;
-}
-
-impl IntoTexel for [u16; 3] {
-    fn into_texel(self, alpha: u16) -> Texel {
-        [self[0], self[1], self[2], alpha]
-    }
+    let [r, g, b] = sum.map(|sum| sum as u16);
+    [r, g, b, (alpha + 0.5) as u16]
 }
 
 #[cfg(test)]
