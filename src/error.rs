@@ -27,6 +27,12 @@ pub enum Error {
     /// Options that contradict each other or are out of range.
     #[error("{0}")]
     Usage(String),
+    /// No graphics adapter can be used; says which there are, or what to install.
+    #[error("{0}")]
+    NoAdapter(String),
+    /// The graphics device failed: out of memory, lost, or a refusal of its driver.
+    #[error("graphics: {0}")]
+    Graphics(String),
     /// A promise of the library itself that did not hold.
     #[error("internal error: {0} (please report this)")]
     Internal(String),
@@ -43,13 +49,14 @@ impl Error {
         Self::Output { path: path.into(), what: what.into() }
     }
 
-    /// The exit code: 1 anything else, 2 usage, 3 input, 4 output.
+    /// The exit code: 1 anything else, 2 usage, 3 input, 4 output, 5 no graphics adapter.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
             Self::Input { .. } => 3,
             Self::Output { .. } => 4,
-            Self::Internal(_) => 1,
+            Self::NoAdapter(_) => 5,
+            Self::Graphics(_) | Self::Internal(_) => 1,
         }
     }
 }

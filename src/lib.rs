@@ -14,6 +14,7 @@ pub mod format;
 pub mod import;
 pub mod mesh;
 mod random;
+pub mod render;
 pub mod report;
 pub mod runtime;
 pub mod texture;

@@ -30,7 +30,7 @@ mod scale;
 mod shape;
 mod shared;
 mod split;
-mod srgb;
+pub(crate) mod srgb;
 #[cfg(test)]
 mod survey;
 #[cfg(test)]

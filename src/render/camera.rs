@@ -1,0 +1,41 @@
+//! The camera as the shaders read it.
+
+use glam::{DMat4, DVec4};
+
+use crate::camera::Pose;
+
+/// What all draws of a frame have in common.
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(super) struct Camera {
+    /// From metres relative to the eye, in the scene's axes, to clip space.
+    clip_from_scene: [[f32; 4]; 4],
+    /// Of a point one metre ahead of the eye: metres to the right, and down, per pixel.
+    metres_per_pixel: [f32; 2],
+    /// The same, at the picture's upper left corner.
+    corner: [f32; 2],
+}
+
+impl Camera {
+    /// Depth is `near / distance`: 1 at the near plane and 0 infinitely far away. In floating
+    /// point this is as precise far away as it is near, so that no far plane is needed.
+    pub fn new(pose: &Pose, size: [u32; 2], near: f32) -> Self {
+        let [width, height] = size.map(f64::from);
+        let fov_y = pose.fov_y_deg.to_radians();
+        let turn = DMat4::from_quat(pose.rotation.inverse());
+        let half_height = (fov_y / 2.0).tan();
+        let half_width = half_height * width / height;
+        let project = DMat4::from_rows(
+            DVec4::X / half_width,
+            DVec4::Y / half_height,
+            DVec4::W * f64::from(near),
+            DVec4::NEG_Z,
+        );
+        Self {
+            clip_from_scene: (project * turn).as_mat4().to_cols_array_2d(),
+            metres_per_pixel: [half_width * 2.0 / width, half_height * 2.0 / height]
+                .map(|metres| metres as f32),
+            corner: [-half_width, -half_height].map(|metres| metres as f32),
+        }
+    }
+}

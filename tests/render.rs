@@ -1,0 +1,489 @@
+//! Pictures of known scenes from known places. Where there is no graphics adapter these tests say
+//! that they were skipped, or fail if `HLOD_REQUIRE_GPU` is 1.
+#![cfg(feature = "render")]
+
+use std::io::Cursor;
+use std::path::Path;
+
+use glam::{DQuat, DVec3};
+use hlod::camera::Pose;
+use hlod::error::Error;
+use hlod::format::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
+use hlod::mesh::{AlphaMode, Wrap};
+use hlod::render::content::{Content, Picture};
+use hlod::render::{RenderOptions, Renderer, Shading, level_tint};
+use image::{Rgba, RgbaImage};
+
+const SIZE: u32 = 64;
+
+fn options() -> RenderOptions {
+    RenderOptions {
+        size: [SIZE, SIZE],
+        shading: Shading::Unlit,
+        background: [10, 20, 30],
+        ..RenderOptions::default()
+    }
+}
+
+const BACKGROUND: [u8; 3] = [10, 20, 30];
+
+fn renderer(options: &RenderOptions) -> Option<Renderer> {
+    match Renderer::new(options) {
+        Ok(renderer) => Some(renderer),
+        Err(Error::NoAdapter(what)) => {
+            let required = std::env::var("HLOD_REQUIRE_GPU").is_ok_and(|value| value == "1");
+            assert!(!required, "a graphics adapter is required: {what}");
+            println!("skipped: {what}");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// At the origin, looking along −z; the picture is two metres wide at one metre.
+fn pose() -> Pose {
+    Pose { position: DVec3::ZERO, rotation: DQuat::IDENTITY, fov_y_deg: 90.0 }
+}
+
+fn plain(color: [f32; 3]) -> Surface {
+    Surface {
+        base_color: [color[0], color[1], color[2], 1.0],
+        image: None,
+        wrap: [Wrap::Repeat; 2],
+        alpha: AlphaMode::Opaque,
+        double_sided: true,
+    }
+}
+
+const RED: [f32; 3] = [1.0, 0.0, 0.0];
+const GREEN: [f32; 3] = [0.0, 1.0, 0.0];
+
+/// A rectangle that faces the camera: from left to right, from bottom to top, at a distance.
+/// Its picture is upright.
+fn rectangle(
+    [left, right]: [f32; 2],
+    [low, high]: [f32; 2],
+    far: f32,
+    surface: Surface,
+) -> Primitive {
+    Primitive {
+        positions: vec![
+            [left, low, -far],
+            [right, low, -far],
+            [right, high, -far],
+            [left, high, -far],
+        ],
+        texcoords: match surface.image {
+            Some(_) => vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]],
+            None => Vec::new(),
+        },
+        colors: Vec::new(),
+        indices: vec![0, 1, 2, 0, 2, 3],
+        surface,
+    }
+}
+
+fn mesh(primitives: Vec<Primitive>) -> NodeMesh {
+    NodeMesh { origin: [0.0; 3], images: Vec::new(), primitives }
+}
+
+fn png(image: &RgbaImage) -> NodeImage {
+    let mut bytes = Cursor::new(Vec::new());
+    image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    let data = NodeImageData::Embedded { mime: "image/png", bytes: bytes.into_inner() };
+    NodeImage { width: image.width(), height: image.height(), data }
+}
+
+fn content(mesh: &NodeMesh) -> Content {
+    Content::from_mesh(Path::new("test.glb"), mesh, |_| Some(0)).unwrap()
+}
+
+/// A picture of one node; `None` without an adapter.
+fn shot(options: &RenderOptions, mesh: &NodeMesh) -> Option<RgbaImage> {
+    shot_from(options, mesh, &pose())
+}
+
+fn shot_from(options: &RenderOptions, mesh: &NodeMesh, pose: &Pose) -> Option<RgbaImage> {
+    let mut renderer = renderer(options)?;
+    renderer.upload(0, 0, &content(mesh)).unwrap();
+    renderer.draw(&[0], pose, 0.1).unwrap();
+    Some(renderer.snapshot().unwrap())
+}
+
+/// The pixel at a place in −1–1 to the right and up.
+fn at(image: &RgbaImage, right: f32, up: f32) -> [u8; 3] {
+    let pixel = |place: f32, size: u32| (((place + 1.0) / 2.0 * size as f32) as u32).min(size - 1);
+    let Rgba([r, g, b, a]) =
+        *image.get_pixel(pixel(right, image.width()), pixel(-up, image.height()));
+    assert_eq!(a, 255);
+    [r, g, b]
+}
+
+#[track_caller]
+fn assert_near(found: [u8; 3], expected: [u8; 3], tolerance: u8) {
+    let far = (0..3).any(|i| found[i].abs_diff(expected[i]) > tolerance);
+    assert!(!far, "found {found:?}, expected {expected:?}");
+}
+
+#[test]
+fn each_thing_is_where_it_stands_in_its_colour() {
+    // Half grey in linear light is 188. Green is to the upper right, and nothing at the left.
+    let scene = mesh(vec![
+        rectangle([0.0, 2.0], [-2.0, 0.0], 2.0, plain([0.5; 3])),
+        rectangle([1.0, 2.0], [1.0, 2.0], 2.0, plain(GREEN)),
+    ]);
+    let Some(image) = shot(&options(), &scene) else { return };
+    assert_near(at(&image, 0.5, -0.5), [188; 3], 0);
+    assert_near(at(&image, 0.75, 0.75), [0, 255, 0], 0);
+    assert_near(at(&image, 0.25, 0.25), BACKGROUND, 0);
+    assert_near(at(&image, -0.5, -0.5), BACKGROUND, 0);
+    // The edges are at the pixel.
+    let x = SIZE / 2;
+    assert_eq!(image.get_pixel(x, SIZE - 1).0, [188, 188, 188, 255]);
+    assert_eq!(image.get_pixel(x - 1, SIZE - 1).0[..3], BACKGROUND);
+}
+
+#[test]
+fn vertex_colours_mix_in_linear_light() {
+    let mut square = rectangle([-1.0, 1.0], [-1.0, 1.0], 1.0, plain([1.0; 3]));
+    let (black, white) = ([0, 0, 0, 65535], [65535; 4]);
+    square.colors = vec![black, white, white, black];
+    let Some(image) = shot(&options(), &mesh(vec![square])) else { return };
+    assert_near(at(&image, 0.0, 0.0), [188; 3], 2);
+    assert_near(at(&image, -0.5, 0.0), [137; 3], 3);
+}
+
+#[test]
+fn the_nearest_is_seen_whatever_comes_first() {
+    let near = || rectangle([-9.0, 9.0], [-9.0, 0.0], 3.0, plain(RED));
+    let far = || rectangle([-9.0, 9.0], [-9.0, 9.0], 3.001, plain(GREEN));
+    for primitives in [vec![near(), far()], vec![far(), near()]] {
+        let Some(image) = shot(&options(), &mesh(primitives)) else { return };
+        assert_near(at(&image, 0.0, -0.5), [255, 0, 0], 0);
+        assert_near(at(&image, 0.0, 0.5), [0, 255, 0], 0);
+    }
+    // A metre at ten kilometres, with a near plane of a tenth of a metre: this needs reversed depth.
+    let near = || rectangle([-9e4, 9e4], [-9e4, 0.0], 10_000.0, plain(RED));
+    let far = || rectangle([-9e4, 9e4], [-9e4, 9e4], 10_001.0, plain(GREEN));
+    for primitives in [vec![near(), far()], vec![far(), near()]] {
+        let Some(image) = shot(&options(), &mesh(primitives)) else { return };
+        assert_near(at(&image, 0.0, -0.5), [255, 0, 0], 0);
+    }
+}
+
+#[test]
+fn what_is_nearer_than_the_near_plane_or_behind_is_not_seen() {
+    let scene = mesh(vec![
+        rectangle([-9.0, 9.0], [-9.0, 9.0], 0.05, plain(RED)),
+        rectangle([-9.0, 9.0], [-9.0, 9.0], -5.0, plain(RED)),
+        rectangle([-9.0, 9.0], [-9.0, 9.0], 5.0, plain(GREEN)),
+    ]);
+    let Some(image) = shot(&options(), &scene) else { return };
+    assert_near(at(&image, 0.0, 0.0), [0, 255, 0], 0);
+}
+
+/// Red, green / blue, white, from the upper left.
+fn four_colors(side: u32) -> RgbaImage {
+    RgbaImage::from_fn(side * 2, side * 2, |x, y| match (x < side, y < side) {
+        (true, true) => Rgba([255, 0, 0, 255]),
+        (false, true) => Rgba([0, 255, 0, 255]),
+        (true, false) => Rgba([0, 0, 255, 255]),
+        (false, false) => Rgba([255; 4]),
+    })
+}
+
+#[test]
+fn pictures_stand_upright() {
+    let surface = Surface { image: Some(0), ..plain([1.0; 3]) };
+    let mut scene = mesh(vec![rectangle([-1.0, 1.0], [-1.0, 1.0], 1.0, surface)]);
+    scene.images = vec![png(&four_colors(32))];
+    let Some(image) = shot(&options(), &scene) else { return };
+    assert_near(at(&image, -0.5, 0.5), [255, 0, 0], 0);
+    assert_near(at(&image, 0.5, 0.5), [0, 255, 0], 0);
+    assert_near(at(&image, -0.5, -0.5), [0, 0, 255], 0);
+    assert_near(at(&image, 0.5, -0.5), [255; 3], 0);
+}
+
+#[test]
+fn pictures_go_on_as_their_surface_says() {
+    for (wrap, expected) in
+        [(Wrap::Repeat, [255, 0, 0]), (Wrap::Mirror, [0, 255, 0]), (Wrap::Clamp, [0, 255, 0])]
+    {
+        let surface = Surface { image: Some(0), wrap: [wrap; 2], ..plain([1.0; 3]) };
+        let mut square = rectangle([-1.0, 1.0], [-1.0, 1.0], 1.0, surface);
+        // The right half of the picture begins again at the left, or does not.
+        square.texcoords.iter_mut().for_each(|[u, _]| *u *= 2.0);
+        let mut scene = mesh(vec![square]);
+        scene.images = vec![png(&four_colors(32))];
+        let Some(image) = shot(&options(), &scene) else { return };
+        assert_near(at(&image, 0.25, 0.5), expected, 0);
+        let last = if wrap == Wrap::Mirror { [255, 0, 0] } else { [0, 255, 0] };
+        assert_near(at(&image, 0.75, 0.5), last, 0);
+    }
+}
+
+#[test]
+fn what_is_cut_out_shows_what_is_behind() {
+    let hole = RgbaImage::from_fn(64, 64, |x, _| Rgba([255, 0, 0, if x < 32 { 0 } else { 255 }]));
+    let fence = |alpha, opacity| Surface {
+        image: Some(0),
+        alpha,
+        base_color: [1.0, 1.0, 1.0, opacity],
+        ..plain([1.0; 3])
+    };
+    let both = |surface| {
+        let mut scene = mesh(vec![
+            rectangle([-1.0, 1.0], [-1.0, 1.0], 1.0, surface),
+            rectangle([-2.0, 2.0], [-2.0, 2.0], 2.0, plain(GREEN)),
+        ]);
+        scene.images = vec![png(&hole)];
+        shot(&options(), &scene)
+    };
+    let mask = |cutoff| AlphaMode::Mask { cutoff };
+    let (red, green) = ([255, 0, 0], [0, 255, 0]);
+    for (alpha, opacity, left, right) in [
+        (mask(0.5), 1.0, green, red),
+        (mask(0.7), 0.6, green, green),
+        (mask(0.5), 0.6, green, red),
+        (mask(0.0), 1.0, red, red),
+        (mask(1.0), 1.0, green, red),
+        (AlphaMode::Opaque, 1.0, red, red),
+        (AlphaMode::Blend, 1.0, green, red),
+    ] {
+        let Some(image) = both(fence(alpha, opacity)) else { return };
+        assert_near(at(&image, -0.5, 0.0), left, 0);
+        assert_near(at(&image, 0.5, 0.0), right, 0);
+    }
+    // Glass of a quarter's opacity takes a quarter of the pixels.
+    let Some(image) = both(fence(AlphaMode::Blend, 0.25)) else { return };
+    let red = image.pixels().filter(|pixel| pixel.0[0] == 255).count();
+    assert_eq!(red, (SIZE * SIZE / 8) as usize);
+}
+
+#[test]
+fn far_pictures_show_the_mean_of_their_texels() {
+    let checker = RgbaImage::from_fn(512, 512, |x, y| {
+        let white = 255 * ((x + y) % 2) as u8;
+        Rgba([white, white, white, 255])
+    });
+    let surface = Surface { image: Some(0), ..plain([1.0; 3]) };
+    let mut scene = mesh(vec![rectangle([-1.0, 1.0], [-1.0, 1.0], 1.0, surface)]);
+    scene.images = vec![png(&checker)];
+    // Eight texels to a pixel.
+    let Some(image) = shot(&options(), &scene) else { return };
+    for x in -9..=9 {
+        assert_near(at(&image, x as f32 / 10.0, 0.3), [188; 3], 1);
+    }
+}
+
+#[test]
+fn levels_tint_what_they_hold() {
+    let square = |x: f32| mesh(vec![rectangle([x, x + 1.0], [-1.0, 1.0], 1.0, plain([0.5; 3]))]);
+    for show_levels in [false, true] {
+        let Some(mut renderer) = renderer(&RenderOptions { show_levels, ..options() }) else {
+            return;
+        };
+        renderer.upload(3, 0, &content(&square(-1.0))).unwrap();
+        renderer.upload(8, 2, &content(&square(0.0))).unwrap();
+        renderer.draw(&[3, 8], &pose(), 0.1).unwrap();
+        let image = renderer.snapshot().unwrap();
+        let (left, right) = (at(&image, -0.5, 0.0), at(&image, 0.5, 0.0));
+        if show_levels {
+            assert_ne!(left, right);
+            let brightest = |tint: [f32; 3]| (0..3).max_by(|a, b| tint[*a].total_cmp(&tint[*b]));
+            let most = |color: [u8; 3]| (0..3).max_by_key(|channel| color[*channel]);
+            assert_eq!(most(left), brightest(level_tint(0)));
+            assert_eq!(most(right), brightest(level_tint(2)));
+        } else {
+            assert_eq!(left, right);
+        }
+    }
+}
+
+#[test]
+fn great_coordinates_give_the_same_picture() {
+    let picture = RgbaImage::from_fn(64, 64, |x, y| Rgba([x as u8 * 4, y as u8 * 4, 77, 255]));
+    let textured = Surface { image: Some(0), ..plain([1.0; 3]) };
+    let mut scene = mesh(vec![
+        rectangle([-3.25, 1.0], [-2.5, 3.0], 4.0, textured),
+        rectangle([-1.0, 7.0], [-4.0, 0.0], 9.0, plain(RED)),
+    ]);
+    // A floor, whose lines run into the distance.
+    let mut floor = rectangle([-50.0, 50.0], [-1.0, -1.0], 0.0, plain(GREEN));
+    floor.positions[2][2] = -200.0;
+    floor.positions[3][2] = -200.0;
+    scene.primitives.push(floor);
+    scene.images = vec![png(&picture)];
+    let mut pose = pose();
+    pose.position = DVec3::new(0.3, 0.2, 0.1);
+    pose.rotation = DQuat::from_rotation_y(0.1) * DQuat::from_rotation_x(-0.2);
+    let options = RenderOptions { shading: Shading::HeadLight, ..options() };
+    let Some(here) = shot_from(&options, &scene, &pose) else { return };
+    assert!(here.pixels().any(|pixel| pixel.0[2] > 40), "the picture is not seen");
+
+    let far = DVec3::new(5e6, -5e6, 250_000.0);
+    scene.origin = far.to_array();
+    pose.position += far;
+    let there = shot_from(&options, &scene, &pose).unwrap();
+    let most = here.iter().zip(there.iter()).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+    // At 5e6 the eye itself is rounded to a nanometre, so that an edge may fall on the other
+    // side of a pixel's middle; nothing else may differ.
+    let differ = here.pixels().zip(there.pixels()).filter(|(a, b)| a != b).count();
+    assert!(most <= 1 || differ <= 2, "{differ} pixels differ by up to {most}");
+}
+
+#[test]
+fn a_light_at_the_viewer_shows_how_planes_stand() {
+    let lit = RenderOptions { shading: Shading::HeadLight, ..options() };
+    let facing = mesh(vec![rectangle([-3.0, 3.0], [-3.0, 3.0], 2.0, plain([1.0; 3]))]);
+    let mut floor = rectangle([-900.0, 900.0], [-1.0, -1.0], 0.0, plain([1.0; 3]));
+    floor.positions[2][2] = -900.0;
+    floor.positions[3][2] = -900.0;
+    // 0.3 + 0.7 × |normal · light|, in linear light.
+    let encoded = |cosine: f64| {
+        let linear = 0.3 + 0.7 * cosine;
+        ((1.055 * linear.powf(1.0 / 2.4) - 0.055) * 255.0).round() as u8
+    };
+    let Some(image) = shot(&lit, &facing) else { return };
+    for (right, up) in [(0.0, 0.0), (-0.9, 0.9), (0.9, -0.3)] {
+        assert_near(at(&image, right, up), [encoded(0.9438); 3], 1);
+    }
+    let image = shot(&lit, &mesh(vec![floor.clone()])).unwrap();
+    for (right, up) in [(0.0, -0.5), (-0.9, -0.9), (0.9, -0.1)] {
+        assert_near(at(&image, right, up), [encoded(0.3304); 3], 1);
+    }
+    // Which way a triangle is turned does not matter.
+    floor.indices.reverse();
+    assert_eq!(shot(&lit, &mesh(vec![floor])).unwrap(), image);
+    // Pictures hold their own light, unless it is asked for.
+    let photo = RenderOptions { shading: Shading::Photo, ..options() };
+    let surface = Surface { image: Some(0), ..plain([1.0; 3]) };
+    let mut textured = mesh(vec![rectangle([-3.0, 3.0], [-3.0, 3.0], 2.0, surface)]);
+    textured.images = vec![png(&RgbaImage::from_pixel(4, 4, Rgba([255; 4])))];
+    assert_near(at(&shot(&photo, &textured).unwrap(), 0.0, 0.0), [255; 3], 0);
+    assert_near(at(&shot(&photo, &facing).unwrap(), 0.0, 0.0), [encoded(0.9438); 3], 1);
+    assert_near(at(&shot(&lit, &textured).unwrap(), 0.0, 0.0), [encoded(0.9438); 3], 1);
+}
+
+#[test]
+fn backs_are_left_away_only_where_that_is_asked_for() {
+    let mut square = rectangle([-1.0, 1.0], [-1.0, 1.0], 1.0, plain(RED));
+    square.surface.double_sided = false;
+    let front = mesh(vec![square.clone()]);
+    square.indices.reverse();
+    let back = mesh(vec![square.clone()]);
+    square.surface.double_sided = true;
+    let both = mesh(vec![square]);
+    for (cull, scene, seen) in
+        [(false, &back, true), (true, &back, false), (true, &front, true), (true, &both, true)]
+    {
+        let Some(image) = shot(&RenderOptions { cull, ..options() }, scene) else { return };
+        let expected = if seen { [255, 0, 0] } else { BACKGROUND };
+        assert_near(at(&image, 0.0, 0.0), expected, 0);
+    }
+}
+
+#[test]
+fn exactly_the_front_is_drawn_and_memory_comes_back() {
+    let Some(mut renderer) = renderer(&options()) else { return };
+    assert_eq!(renderer.gpu_bytes(), 0);
+    let left = content(&mesh(vec![rectangle([-1.0, 0.0], [-1.0, 1.0], 1.0, plain(RED))]));
+    let surface = Surface { image: Some(0), ..plain([1.0; 3]) };
+    let mut right = mesh(vec![rectangle([0.0, 1.0], [-1.0, 1.0], 1.0, surface)]);
+    right.images = vec![NodeImage {
+        width: 9,
+        height: 5,
+        data: NodeImageData::Shared { file_name: "green.png".into() },
+    }];
+    let right = content(&right);
+    let green = Picture::new(9, 5, [0, 255, 0, 255].repeat(45)).unwrap();
+
+    renderer.upload(4, 1, &left).unwrap();
+    renderer.upload(4_000_000_000, 1, &right).unwrap();
+    // What is drawn must be there, shared pictures too.
+    assert!(renderer.draw(&[5], &pose(), 0.1).is_err());
+    assert!(renderer.draw(&[4_000_000_000], &pose(), 0.1).is_err());
+    renderer.upload_shared(0, &green).unwrap();
+    assert_eq!(renderer.gpu_bytes(), left.bytes() + right.bytes() + green.bytes());
+    renderer.finish_uploads().unwrap();
+
+    let mut colors = |front: &[u32]| {
+        let times = renderer.draw(front, &pose(), 0.1).unwrap();
+        assert!(times.encode_ms >= 0.0 && times.gpu_wait_ms > 0.0);
+        assert_eq!(times.triangles, front.len() as u64 * 2);
+        let (image, coverage) = (renderer.snapshot().unwrap(), renderer.coverage().unwrap());
+        let covered = coverage.pixels().filter(|pixel| pixel.0[0] == 255).count();
+        assert_eq!(covered, front.len() * (SIZE * SIZE / 2) as usize);
+        [at(&image, -0.5, 0.0), at(&image, 0.5, 0.0)]
+    };
+    let (red, green_seen) = ([255, 0, 0], [0, 255, 0]);
+    assert_eq!(colors(&[4_000_000_000, 4]), [red, green_seen]);
+    assert_eq!(colors(&[4]), [red, BACKGROUND]);
+    assert_eq!(colors(&[4_000_000_000]), [BACKGROUND, green_seen]);
+    assert_eq!(colors(&[]), [BACKGROUND; 2]);
+
+    // Uploading again takes no more; removing what is not there takes nothing.
+    renderer.upload(4, 1, &left).unwrap();
+    renderer.upload_shared(0, &green).unwrap();
+    renderer.remove(99);
+    assert_eq!(renderer.gpu_bytes(), left.bytes() + right.bytes() + green.bytes());
+    renderer.remove(4);
+    assert_eq!(renderer.gpu_bytes(), right.bytes() + green.bytes());
+    assert!(renderer.draw(&[4], &pose(), 0.1).is_err());
+    renderer.remove_shared(0);
+    renderer.remove(4_000_000_000);
+    renderer.remove(4_000_000_000);
+    assert_eq!(renderer.gpu_bytes(), 0);
+    renderer.draw(&[], &pose(), 0.1).unwrap();
+}
+
+#[test]
+fn many_draws_find_their_instances() {
+    // More than there is room for at first, each in its own place.
+    let Some(mut renderer) = renderer(&options()) else { return };
+    let side = 32u32;
+    let step = 2.0 / side as f32;
+    for node in 0..side * side {
+        let (x, y) = (node % side, node / side);
+        let color = [f32::from((x % 2) as u8), f32::from((y % 2) as u8), 1.0];
+        let square = rectangle([0.0, step], [0.0, step], 0.0, plain(color));
+        let origin = [x as f32 * step - 1.0, y as f32 * step - 1.0, -1.0].map(f64::from);
+        let mesh = NodeMesh { origin, ..mesh(vec![square]) };
+        renderer.upload(node, 0, &content(&mesh)).unwrap();
+    }
+    let front: Vec<u32> = (0..side * side).collect();
+    let times = renderer.draw(&front, &pose(), 0.1).unwrap();
+    assert_eq!(times.draw_calls, side * side);
+    let image = renderer.snapshot().unwrap();
+    for (x, y, pixel) in image.enumerate_pixels() {
+        let (column, row) = (x * side / SIZE, side - 1 - y * side / SIZE);
+        let expected = [(column % 2) as u8 * 255, (row % 2) as u8 * 255, 255, 255];
+        assert_eq!(pixel.0, expected, "{x} {y}");
+    }
+}
+
+#[test]
+fn odd_sizes_are_read_back_whole() {
+    let options = RenderOptions { size: [70, 33], ..options() };
+    let scene = mesh(vec![rectangle([0.0, 9.0], [-9.0, 9.0], 1.0, plain(RED))]);
+    let Some(image) = shot(&options, &scene) else { return };
+    assert_eq!(image.dimensions(), (70, 33));
+    for (x, _, pixel) in image.enumerate_pixels() {
+        let expected = if x < 35 { BACKGROUND } else { [255, 0, 0] };
+        assert_eq!(pixel.0[..3], expected, "{x}");
+    }
+}
+
+#[test]
+fn what_cannot_be_had_is_refused() {
+    let unknown = RenderOptions { adapter: Some("no such adapter".into()), ..options() };
+    let error = Renderer::new(&unknown).err().expect("an adapter of that name");
+    assert_eq!(error.exit_code(), 5, "{error}");
+    if renderer(&options()).is_none() {
+        return;
+    }
+    for size in [[0, 10], [10, 0], [10, u32::MAX]] {
+        let error = Renderer::new(&RenderOptions { size, ..options() }).err().expect("a size");
+        assert_eq!(error.exit_code(), 2, "{error}");
+    }
+}
