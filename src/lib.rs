@@ -12,11 +12,13 @@ pub mod city;
 pub mod error;
 pub mod format;
 pub mod import;
+pub mod loading;
 pub mod mesh;
-mod random;
 pub mod render;
 pub mod report;
 pub mod runtime;
 pub mod texture;
+
+mod random;
 
 pub use error::{Error, Result};

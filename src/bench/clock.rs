@@ -67,6 +67,11 @@ impl ClockConstants {
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
     }
 
+    /// Writes the constants, beside and renamed.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        super::write::write_beside(path, self.to_json().as_bytes())
+    }
+
     fn check(&self) -> Result<(), String> {
         if self.version != CLOCK_FILE_VERSION {
             return Err(format!(

@@ -5,10 +5,13 @@ mod model;
 mod options;
 mod record;
 mod replay;
+mod session;
 mod statistics;
 mod summary;
 #[cfg(test)]
 mod tests;
+#[cfg(feature = "render")]
+mod wall;
 mod write;
 
 pub use clock::{CLOCK_FILE_VERSION, ClockConstants};
@@ -16,5 +19,8 @@ pub use model::ModelWorld;
 pub use options::{BenchOptions, Pace, Size};
 pub use record::FrameRecord;
 pub use replay::{Drawn, Replay, Run, World, run};
+pub use session::Session;
 pub use summary::{Context, summary, summary_text};
+#[cfg(feature = "render")]
+pub use wall::{Snapshots, WallWorld, calibrate, measure_start};
 pub use write::write_run;

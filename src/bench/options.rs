@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::runtime::lakhia::LakhiaOptions;
 use crate::runtime::residency::ResidencyOptions;
+use crate::{Error, Result};
 
 /// All that determines a run, beside scene and path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -18,6 +19,60 @@ pub struct BenchOptions {
     pub size: Size,
     /// Frames for which the camera stands at the first pose before the log begins.
     pub settle_frames: u64,
+}
+
+impl BenchOptions {
+    /// Refuses what is out of range, by the name of the option.
+    pub fn check(&self) -> Result<()> {
+        let selection = &self.selection;
+        let ranges = [
+            ("--target-ms", selection.target_ms, selection.target_ms > 0.0, "above 0"),
+            ("--vis", selection.vis, selection.vis >= 0.0, "at least 0"),
+            ("--fore", selection.fore, (0.0..=1.0).contains(&selection.fore), "0 to 1"),
+            ("--hyst-switch", selection.hyst_switch, selection.hyst_switch > 0.0, "above 0"),
+            (
+                "--hyst-limit",
+                selection.hyst_limit,
+                selection.hyst_limit >= selection.hyst_switch,
+                "at least --hyst-switch",
+            ),
+            ("--lookahead", selection.lookahead_s, selection.lookahead_s >= 0.0, "at least 0"),
+            (
+                "--least-distance",
+                selection.least_distance,
+                selection.least_distance > 0.0,
+                "above 0",
+            ),
+            (
+                "--v-time-gain",
+                selection.v_time_gain,
+                (0.0..=1.0).contains(&selection.v_time_gain),
+                "0 to 1",
+            ),
+            (
+                "--share-gain",
+                selection.share_gain,
+                (0.0..1.0).contains(&selection.share_gain),
+                "0 to 1, 1 excluded",
+            ),
+            ("--share-slack", selection.share_slack, selection.share_slack >= 0.0, "at least 0"),
+            (
+                "--evict-margin",
+                self.residency.evict_margin,
+                self.residency.evict_margin >= 0.0,
+                "at least 0",
+            ),
+        ];
+        if let Some((name, value, _, range)) =
+            ranges.iter().find(|(_, value, fits, _)| !(*fits && value.is_finite()))
+        {
+            return Err(Error::Usage(format!("{name}: expected {range}, found {value}")));
+        }
+        if self.residency.portion_bytes == 0 {
+            return Err(Error::Usage("--portion: expected at least 1 byte, found 0".into()));
+        }
+        Ok(())
+    }
 }
 
 /// Width and height of the picture, pixels.

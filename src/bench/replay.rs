@@ -36,6 +36,12 @@ pub trait World {
         interval_ms: f64,
     ) -> Result<()>;
 
+    /// Frame `frame` of the path was logged: a time for what must not be timed.
+    fn logged(&mut self, frame: u64) -> Result<()> {
+        let _ = frame;
+        Ok(())
+    }
+
     /// Bytes of the whole process; 0 where that is not measured.
     fn process_bytes(&mut self) -> u64;
 }
@@ -98,6 +104,7 @@ pub fn run(mut replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> boo
     }
     for index in 0..replay.path.frames.len() {
         let record = state.frame(&mut replay, index)?;
+        replay.world.logged(index as u64)?;
         let go_on = progress(&record);
         state.run.frames.push(record);
         if !go_on {

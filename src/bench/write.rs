@@ -5,16 +5,21 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::{FrameRecord, Run};
+use super::{Context, FrameRecord, Run};
 use crate::{Error, Result};
 
 /// Writes `frames.csv` and `summary.json` into a folder, which is made where it is missing; each
 /// beside and renamed. The paths of the files.
-pub fn write_run(dir: &Path, run: &Run, levels: usize, summary: &Value) -> Result<Vec<PathBuf>> {
+pub fn write_run(
+    dir: &Path,
+    run: &Run,
+    context: &Context,
+    summary: &Value,
+) -> Result<Vec<PathBuf>> {
     std::fs::create_dir_all(dir)
         .map_err(|error| Error::output(dir, format!("cannot make the folder: {error}")))?;
     let frames = dir.join("frames.csv");
-    write_beside(&frames, &frames_csv(run, levels)?)?;
+    write_beside(&frames, &frames_csv(run, context.levels)?)?;
     let json = dir.join("summary.json");
     let text = serde_json::to_string_pretty(summary)
         .map_err(|error| Error::Internal(format!("a summary that has no JSON form: {error}")))?;

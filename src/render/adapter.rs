@@ -11,7 +11,7 @@ const INSTALL: &str = "install a driver for the graphics card, or one that draws
      (Debian and Ubuntu: sudo apt-get install mesa-vulkan-drivers)";
 
 /// A graphics adapter, for people.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct AdapterLabel {
     /// As its driver calls it.
     pub name: String,

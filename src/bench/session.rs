@@ -1,0 +1,201 @@
+//! A built scene that is open for runs.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+use super::{BenchOptions, ClockConstants, Context, FrameRecord, ModelWorld, Replay, Run, run};
+use crate::camera::CameraPath;
+use crate::format::Scene;
+use crate::loading::NodeFiles;
+use crate::render::content::{held_bytes, picture_bytes};
+use crate::runtime::lakhia::Lakhia;
+use crate::runtime::residency::{Residency, Sizes};
+use crate::runtime::{Policy, SceneTree};
+use crate::{Error, Result};
+
+/// A built scene that is open for runs.
+#[derive(Clone, Debug)]
+pub struct Session {
+    dir: PathBuf,
+    scene: Arc<Scene>,
+    tree: SceneTree,
+}
+
+impl Session {
+    /// Opens what `hlod-build` wrote into `dir`.
+    pub fn open(dir: &Path) -> Result<Self> {
+        let scene = Arc::new(Scene::read(dir)?);
+        let tree = SceneTree::new(&scene);
+        Ok(Self { dir: dir.to_owned(), scene, tree })
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// The hierarchy as selection sees it.
+    pub fn tree(&self) -> &SceneTree {
+        &self.tree
+    }
+
+    /// The files of the scene.
+    pub fn files(&self) -> NodeFiles {
+        NodeFiles::new(&self.dir, Arc::clone(&self.scene))
+    }
+
+    fn residency(&self, options: &BenchOptions) -> Result<Arc<Mutex<Residency>>> {
+        let sizes =
+            Sizes::new(&self.scene, held_bytes, |[width, height]| picture_bytes(width, height));
+        Ok(Arc::new(Mutex::new(Residency::new(&self.tree, sizes, options.residency)?)))
+    }
+
+    fn context(&self, options: BenchOptions, path: &CameraPath, policy: &dyn Policy) -> Context {
+        Context {
+            options,
+            policy: policy.name(),
+            clock: "model",
+            constants: ClockConstants::default(),
+            scene_fingerprint: hexadecimal(&self.scene.fingerprint),
+            path_fingerprint: path_fingerprint(path),
+            adapter: None,
+            broken: Vec::new(),
+            levels: self.scene.level_count(),
+        }
+    }
+
+    /// Replays a path by the model clock: nothing is drawn, and every machine gives the same.
+    pub fn run_model(
+        &self,
+        path: &CameraPath,
+        mut options: BenchOptions,
+        constants: ClockConstants,
+        progress: impl FnMut(&FrameRecord) -> bool,
+    ) -> Result<(Run, Context)> {
+        options.selection.time = constants.time_model();
+        options.check()?;
+        let mut policy = Lakhia::new(options.selection);
+        let context = Context { constants, ..self.context(options, path, &policy) };
+        let mut world = ModelWorld::new(&self.tree, constants);
+        let replay = Replay {
+            tree: &self.tree,
+            path,
+            policy: &mut policy,
+            residency: self.residency(&options)?,
+            world: &mut world,
+            options,
+            levels: self.scene.level_count(),
+        };
+        Ok((run(replay, progress)?, context))
+    }
+
+    /// Replays a path on a graphics adapter, by the clock on the wall. Where `constants` are
+    /// given, they are what selection expects of time at first; otherwise the roots are timed
+    /// from places on the path.
+    #[cfg(feature = "render")]
+    pub fn run_wall(
+        &self,
+        path: &CameraPath,
+        mut options: BenchOptions,
+        constants: Option<ClockConstants>,
+        renderer: &mut crate::render::Renderer,
+        snapshots: Option<super::Snapshots>,
+        progress: impl FnMut(&FrameRecord) -> bool,
+    ) -> Result<(Run, Context)> {
+        options.check()?;
+        let measured = self.time_roots(renderer, path)?;
+        let constants = constants.unwrap_or(ClockConstants {
+            fixed_ms: measured.fixed_ms,
+            ms_per_cost: measured.ms_per_cost,
+            ..ClockConstants::default()
+        });
+        options.selection.time = constants.time_model();
+        // The overhead is that of this machine and this size of picture in any case.
+        options.selection.time.fixed_ms = measured.fixed_ms;
+        let mut policy = Lakhia::new(options.selection);
+        let adapter = serde_json::to_value(renderer.adapter())
+            .map_err(|error| Error::Internal(format!("an adapter without JSON form: {error}")))?;
+        let mut context = Context {
+            constants,
+            clock: "wall",
+            adapter: Some(adapter),
+            ..self.context(options, path, &policy)
+        };
+        let residency = self.residency(&options)?;
+        let mut world = super::WallWorld::new(
+            &self.tree,
+            self.files(),
+            renderer,
+            Arc::clone(&residency),
+            snapshots,
+        );
+        let replay = Replay {
+            tree: &self.tree,
+            path,
+            policy: &mut policy,
+            residency,
+            world: &mut world,
+            options,
+            levels: self.scene.level_count(),
+        };
+        let run = run(replay, progress)?;
+        context.broken = world.broken().to_vec();
+        Ok((run, context))
+    }
+
+    /// Measures the constants of the model clock over this scene, from places on a path.
+    #[cfg(feature = "render")]
+    pub fn calibrate(
+        &self,
+        path: &CameraPath,
+        renderer: &mut crate::render::Renderer,
+    ) -> Result<ClockConstants> {
+        super::calibrate(renderer, &self.tree, &self.files(), path, |_| {})
+    }
+
+    /// Times the roots that can be read, and lets go of them again.
+    #[cfg(feature = "render")]
+    fn time_roots(
+        &self,
+        renderer: &mut crate::render::Renderer,
+        path: &CameraPath,
+    ) -> Result<crate::runtime::lakhia::TimeModel> {
+        let files = self.files();
+        let mut held = vec![false; self.scene.shared_textures.len()];
+        let mut front = Vec::new();
+        for &root in self.tree.roots() {
+            // What cannot be read is told of by the run itself.
+            let Ok(arrival) = files.read(root, |texture| held[texture as usize]) else { continue };
+            for (texture, picture) in &arrival.pictures {
+                held[*texture as usize] = true;
+                renderer.upload_shared(*texture, picture)?;
+            }
+            renderer.upload(root, 0, &arrival.content)?;
+            front.push(root);
+        }
+        let measured = super::measure_start(renderer, &self.tree, path, &front)?;
+        front.iter().for_each(|&root| renderer.remove(root));
+        (0..held.len() as u32).for_each(|texture| renderer.remove_shared(texture));
+        Ok(measured)
+    }
+}
+
+/// BLAKE3 over times and poses, so that equal paths are known as such whatever their files.
+fn path_fingerprint(path: &CameraPath) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for frame in &path.frames {
+        let pose = &frame.pose;
+        let numbers = [frame.time_s, pose.fov_y_deg]
+            .into_iter()
+            .chain(pose.position.to_array())
+            .chain(pose.rotation.to_array());
+        numbers.for_each(|number| {
+            hasher.update(&number.to_le_bytes());
+        });
+    }
+    hexadecimal(hasher.finalize().as_bytes())
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}

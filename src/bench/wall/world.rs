@@ -1,0 +1,165 @@
+//! The real world: a loading thread, a graphics adapter, and time as it passes.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use super::{Snapshots, process};
+use crate::bench::replay::lock;
+use crate::bench::{Drawn, World};
+use crate::camera::Pose;
+use crate::loading::{Arrival, LoadingThread, NodeFiles};
+use crate::render::Renderer;
+use crate::runtime::SceneTree;
+use crate::runtime::residency::{Changes, Residency};
+use crate::{Error, Result};
+
+/// The real world.
+pub struct WallWorld<'a> {
+    tree: &'a SceneTree,
+    files: NodeFiles,
+    renderer: &'a mut Renderer,
+    thread: Option<LoadingThread>,
+    residency: Arc<Mutex<Residency>>,
+    /// Decoded, and not yet resident.
+    arrived: BTreeMap<u32, Arrival>,
+    /// Files that cannot be used, each once.
+    broken: Vec<String>,
+    snapshots: Option<Snapshots>,
+    /// Metres; nothing nearer is seen.
+    near: f32,
+    start: Instant,
+    frame_start: Instant,
+}
+
+impl<'a> WallWorld<'a> {
+    /// A world in which nothing is loaded yet.
+    pub fn new(
+        tree: &'a SceneTree,
+        files: NodeFiles,
+        renderer: &'a mut Renderer,
+        residency: Arc<Mutex<Residency>>,
+        snapshots: Option<Snapshots>,
+    ) -> Self {
+        let near = near_plane(tree);
+        let now = Instant::now();
+        Self {
+            tree,
+            files,
+            renderer,
+            thread: None,
+            residency,
+            arrived: BTreeMap::new(),
+            broken: Vec::new(),
+            snapshots,
+            near,
+            start: now,
+            frame_start: now,
+        }
+    }
+
+    /// Files that could not be used, each with what was wrong.
+    pub fn broken(&self) -> &[String] {
+        &self.broken
+    }
+
+    /// Takes what the loading thread delivered.
+    fn receive(&mut self) {
+        for arrival in self.thread.iter().flat_map(LoadingThread::arrivals) {
+            match arrival {
+                Ok(arrival) => {
+                    self.arrived.insert(arrival.node, arrival);
+                }
+                Err(error) => self.broken.push(error.to_string()),
+            }
+        }
+    }
+
+    fn upload(&mut self, arrival: &Arrival) -> Result<()> {
+        for (texture, picture) in &arrival.pictures {
+            self.renderer.upload_shared(*texture, picture)?;
+        }
+        let level = self.tree.node(arrival.node).level;
+        self.renderer.upload(arrival.node, level, &arrival.content)
+    }
+}
+
+/// Metres of the nearest that is seen: a hand's breadth, and less in scenes of a few metres.
+pub(super) fn near_plane(tree: &SceneTree) -> f32 {
+    ((tree.diagonal() * 1e-4) as f32).clamp(1e-6, 0.1)
+}
+
+impl World for WallWorld<'_> {
+    fn load_roots(&mut self, residency: &Mutex<Residency>, roots: &[u32]) -> Result<()> {
+        for &root in roots {
+            let mut residency = lock(residency)?;
+            let step = residency.load_root(root);
+            residency.portion_read(root, step.bytes);
+            match self.files.read(root, |texture| residency.has_texture(texture)) {
+                Ok(arrival) => {
+                    self.arrived.insert(root, arrival);
+                    residency.loaded(root);
+                }
+                Err(error) => {
+                    self.broken.push(error.to_string());
+                    residency.broken(root);
+                }
+            }
+        }
+        let thread = LoadingThread::start(self.files.clone(), Arc::clone(&self.residency))?;
+        self.thread = Some(thread);
+        Ok(())
+    }
+
+    fn apply(&mut self, changes: &Changes) -> Result<f64> {
+        self.frame_start = Instant::now();
+        self.receive();
+        changes.left.iter().for_each(|&node| self.renderer.remove(node));
+        changes.left_textures.iter().for_each(|&texture| self.renderer.remove_shared(texture));
+        for &node in &changes.arrived {
+            let arrival = self.arrived.remove(&node).ok_or_else(|| {
+                Error::Internal(format!("node {node} was said to be loaded and is not there"))
+            })?;
+            self.upload(&arrival)?;
+        }
+        if !changes.arrived.is_empty() {
+            self.renderer.finish_uploads()?;
+        }
+        Ok(self.frame_start.elapsed().as_secs_f64() * 1e3)
+    }
+
+    fn now_ms(&mut self) -> f64 {
+        self.start.elapsed().as_secs_f64() * 1e3
+    }
+
+    fn draw(&mut self, _: u64, front: &[u32], pose: &Pose) -> Result<Drawn> {
+        let begin = Instant::now();
+        self.renderer.draw(front, pose, self.near)?;
+        Ok(Drawn { draw_ms: begin.elapsed().as_secs_f64() * 1e3 })
+    }
+
+    fn priorities_set(&mut self) {
+        if let Some(thread) = &self.thread {
+            thread.wake();
+        }
+    }
+
+    fn end_frame(&mut self, _: &Mutex<Residency>, _: f64, interval_ms: f64) -> Result<()> {
+        let interval = Duration::try_from_secs_f64(interval_ms / 1e3).unwrap_or(Duration::ZERO);
+        if let Some(left) = interval.checked_sub(self.frame_start.elapsed()) {
+            std::thread::sleep(left);
+        }
+        Ok(())
+    }
+
+    fn logged(&mut self, frame: u64) -> Result<()> {
+        match &self.snapshots {
+            Some(snapshots) => snapshots.take(frame, self.renderer),
+            None => Ok(()),
+        }
+    }
+
+    fn process_bytes(&mut self) -> u64 {
+        process::resident_bytes()
+    }
+}

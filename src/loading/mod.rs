@@ -1,0 +1,9 @@
+//! Brings nodes from files into memory: [`NodeFiles`] reads and decodes them, [`LoadingThread`]
+//! does so beside the thread that draws, in the order that
+//! [`Residency`](crate::runtime::residency::Residency) asks for.
+
+mod node_files;
+mod thread;
+
+pub use node_files::{Arrival, NodeFiles, Reading};
+pub use thread::LoadingThread;

@@ -1,0 +1,181 @@
+//! The files of a built scene: read in portions, checked, and decoded.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use crate::format::{NODES_DIR, Scene, TEXTURES_DIR, file_crc};
+use crate::render::content::{Content, Picture};
+use crate::{Error, Result};
+
+/// The files of a built scene.
+#[derive(Clone, Debug)]
+pub struct NodeFiles {
+    dir: PathBuf,
+    scene: Arc<Scene>,
+    textures: FxHashMap<String, u32>,
+}
+
+/// A node that was read and decoded.
+#[derive(Debug)]
+pub struct Arrival {
+    /// Its index in the scene.
+    pub node: u32,
+    /// Its geometry and pictures.
+    pub content: Content,
+    /// Shared pictures that were not in memory when its load began, by index.
+    pub pictures: Vec<(u32, Picture)>,
+}
+
+/// The files of one node, half read.
+#[derive(Debug)]
+pub struct Reading {
+    node: u32,
+    /// The file of the node, then those of shared pictures, with their sizes.
+    files: Vec<(PathBuf, u64)>,
+    textures: Vec<u32>,
+    /// The file being read, and which.
+    open: Option<(usize, File)>,
+    bytes: Vec<u8>,
+}
+
+impl NodeFiles {
+    /// The files of the scene that stands in `dir`.
+    pub fn new(dir: &Path, scene: Arc<Scene>) -> Self {
+        let textures = scene
+            .shared_textures
+            .iter()
+            .zip(0..)
+            .map(|(texture, index)| (texture.file_name.clone(), index))
+            .collect();
+        Self { dir: dir.to_owned(), scene, textures }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// Begins to read a node and the shared pictures that it needs of which `held` says that they
+    /// are not in memory.
+    pub fn begin(&self, node: u32, held: impl Fn(u32) -> bool) -> Reading {
+        let entry = &self.scene.nodes[node as usize];
+        let mut textures = entry.shared_textures.clone();
+        textures.sort_unstable();
+        textures.dedup();
+        textures.retain(|&texture| !held(texture));
+        let mut files = vec![(self.dir.join(NODES_DIR).join(&entry.file), entry.file_bytes)];
+        files.extend(textures.iter().map(|&texture| {
+            let texture = &self.scene.shared_textures[texture as usize];
+            (self.dir.join(TEXTURES_DIR).join(&texture.file_name), texture.bytes)
+        }));
+        Reading { node, files, textures, open: None, bytes: Vec::new() }
+    }
+
+    /// Checks and decodes a node all of whose bytes were read.
+    pub fn finish(&self, reading: Reading) -> Result<Arrival> {
+        let Reading { node, files, textures, bytes, .. } = reading;
+        let entry = &self.scene.nodes[node as usize];
+        let (path, size) = &files[0];
+        let (glb, mut rest) = bytes.split_at_checked(*size as usize).ok_or_else(|| {
+            Error::input(path, format!("expected {size} bytes, found {}", bytes.len()))
+        })?;
+        let found = file_crc(glb);
+        if found != entry.file_crc {
+            return Err(Error::input(
+                path,
+                format!("damaged: expected CRC-32 {:08x}, found {found:08x}", entry.file_crc),
+            ));
+        }
+        let content = Content::decode(path, glb, |name| self.textures.get(name).copied())?;
+        let mut pictures = Vec::with_capacity(textures.len());
+        for (&texture, (path, size)) in textures.iter().zip(&files[1..]) {
+            let (bytes, after) = rest.split_at_checked(*size as usize).ok_or_else(|| {
+                Error::input(path, format!("expected {size} bytes, found {}", rest.len()))
+            })?;
+            let entry = &self.scene.shared_textures[texture as usize];
+            pictures.push((texture, Picture::decode(path, bytes, [entry.width, entry.height])?));
+            rest = after;
+        }
+        Ok(Arrival { node, content, pictures })
+    }
+
+    /// Reads and decodes a node in one go.
+    pub fn read(&self, node: u32, held: impl Fn(u32) -> bool) -> Result<Arrival> {
+        let mut reading = self.begin(node, held);
+        let bytes = reading.left();
+        reading.read(bytes)?;
+        self.finish(reading)
+    }
+}
+
+impl Reading {
+    /// Bytes that are to be read in all.
+    fn total(&self) -> u64 {
+        self.files.iter().map(|(_, size)| size).sum()
+    }
+
+    /// Bytes that are left.
+    pub fn left(&self) -> u64 {
+        self.total() - self.bytes.len() as u64
+    }
+
+    /// Bytes that were read.
+    pub fn done(&self) -> u64 {
+        self.bytes.len() as u64
+    }
+
+    /// Reads the next `bytes` bytes, or those that are left.
+    pub fn read(&mut self, bytes: u64) -> Result<()> {
+        let mut wanted = bytes.min(self.left());
+        while wanted > 0 {
+            let (which, left) = self.place();
+            let part = wanted.min(left);
+            self.read_from(which, part)?;
+            wanted -= part;
+        }
+        Ok(())
+    }
+
+    /// The file in which the next byte stands, and how many of its bytes are left.
+    fn place(&self) -> (usize, u64) {
+        let mut end = 0;
+        for (which, (_, size)) in self.files.iter().enumerate() {
+            end += size;
+            if self.done() < end {
+                return (which, end - self.done());
+            }
+        }
+        (self.files.len() - 1, 0)
+    }
+
+    fn read_from(&mut self, which: usize, bytes: u64) -> Result<()> {
+        let (path, size) = &self.files[which];
+        let failed = |error: std::io::Error| Error::input(path, format!("cannot read: {error}"));
+        let mut file = match self.open.take() {
+            Some((open, file)) if open == which => file,
+            _ => {
+                let file = File::open(path).map_err(failed)?;
+                let found = file.metadata().map_err(failed)?.len();
+                if found != *size {
+                    return Err(Error::input(
+                        path,
+                        format!("expected {size} bytes, found {found}: not the file of this build"),
+                    ));
+                }
+                file
+            }
+        };
+        let from = self.bytes.len();
+        let read = Read::by_ref(&mut file).take(bytes).read_to_end(&mut self.bytes);
+        read.map_err(failed)?;
+        if ((self.bytes.len() - from) as u64) < bytes {
+            return Err(Error::input(path, format!("expected {size} bytes, found fewer")));
+        }
+        self.open = Some((which, file));
+        Ok(())
+    }
+}

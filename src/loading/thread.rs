@@ -1,0 +1,152 @@
+//! The loading thread (thesis, section 4.3).
+
+use std::collections::BTreeMap;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use super::{Arrival, NodeFiles, Reading};
+use crate::runtime::residency::{NodeState, Residency, Step};
+use crate::{Error, Result};
+
+/// After so long without a word it looks again whether there is something to do.
+const LONGEST_SLEEP: Duration = Duration::from_millis(100);
+
+/// Reads the most important node that is not in memory, in small portions, and looks after each
+/// whether another has become more important; that one is then read first, and the other goes on
+/// later where it was.
+#[derive(Debug)]
+pub struct LoadingThread {
+    shared: Arc<Shared>,
+    arrivals: Receiver<Result<Arrival>>,
+    handle: Option<JoinHandle<()>>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    residency: Arc<Mutex<Residency>>,
+    wake: Condvar,
+    stop: Mutex<bool>,
+}
+
+impl LoadingThread {
+    /// Starts to load what `residency` asks for.
+    pub fn start(files: NodeFiles, residency: Arc<Mutex<Residency>>) -> Result<Self> {
+        let (sender, arrivals) = channel();
+        let shared = Arc::new(Shared { residency, wake: Condvar::new(), stop: Mutex::new(false) });
+        let of_thread = Arc::clone(&shared);
+        let handle = std::thread::Builder::new()
+            .name("loading".into())
+            .spawn(move || Loader { shared: of_thread, files, sender }.run())
+            .map_err(|error| {
+                Error::Internal(format!("cannot start the loading thread: {error}"))
+            })?;
+        Ok(Self { shared, arrivals, handle: Some(handle) })
+    }
+
+    /// Says that there may be something new to do.
+    pub fn wake(&self) {
+        self.shared.wake.notify_one();
+    }
+
+    /// What arrived since the last call; errors name files that cannot be used. A node comes here
+    /// before [`Residency::begin_frame`] says that it arrived.
+    pub fn arrivals(&self) -> impl Iterator<Item = Result<Arrival>> + '_ {
+        self.arrivals.try_iter()
+    }
+}
+
+impl Drop for LoadingThread {
+    fn drop(&mut self) {
+        if let Ok(mut stop) = self.shared.stop.lock() {
+            *stop = true;
+        }
+        self.wake();
+        if let Some(handle) = self.handle.take() {
+            // A thread that died has told so by what it did not deliver.
+            let _ = handle.join();
+        }
+    }
+}
+
+struct Loader {
+    shared: Arc<Shared>,
+    files: NodeFiles,
+    sender: Sender<Result<Arrival>>,
+}
+
+impl Loader {
+    fn run(&self) {
+        let mut readings = BTreeMap::new();
+        while let Some((step, reading)) = self.next(&mut readings) {
+            if !self.carry_out(step, reading, &mut readings) {
+                return;
+            }
+        }
+    }
+
+    fn stopped(&self) -> bool {
+        self.shared.stop.lock().map_or(true, |stop| *stop)
+    }
+
+    fn lock(&self) -> Option<MutexGuard<'_, Residency>> {
+        self.shared.residency.lock().ok()
+    }
+
+    /// Waits for something to read; `None` at the end.
+    fn next(&self, readings: &mut BTreeMap<u32, Reading>) -> Option<(Step, Reading)> {
+        let mut residency = self.lock()?;
+        loop {
+            if self.stopped() {
+                return None;
+            }
+            let step = residency.next_step();
+            // Loads that were given up.
+            readings.retain(|&node, _| matches!(residency.state(node), NodeState::Loading { .. }));
+            if let Some(step) = step {
+                let suspended = readings.remove(&step.node);
+                let reading = suspended.filter(|reading| reading.done() == step.from);
+                let reading = reading.unwrap_or_else(|| {
+                    self.files.begin(step.node, |texture| residency.has_texture(texture))
+                });
+                return Some((step, reading));
+            }
+            residency = self.shared.wake.wait_timeout(residency, LONGEST_SLEEP).ok()?.0;
+        }
+    }
+
+    /// Reads a portion and decodes the node where it was the last; false at the end.
+    fn carry_out(
+        &self,
+        step: Step,
+        mut reading: Reading,
+        readings: &mut BTreeMap<u32, Reading>,
+    ) -> bool {
+        let read = reading.read(step.bytes);
+        let whole = {
+            let Some(mut residency) = self.lock() else { return false };
+            if let Err(error) = read {
+                residency.broken(step.node);
+                drop(residency);
+                return self.sender.send(Err(error)).is_ok();
+            }
+            residency.portion_read(step.node, step.bytes)
+        };
+        if !whole {
+            readings.insert(step.node, reading);
+            return true;
+        }
+        let arrival = self.files.finish(reading);
+        let usable = arrival.is_ok();
+        // It is there before anybody is told that it is.
+        let sent = self.sender.send(arrival).is_ok();
+        let Some(mut residency) = self.lock() else { return false };
+        if usable {
+            residency.loaded(step.node);
+        } else {
+            residency.broken(step.node);
+        }
+        sent
+    }
+}
