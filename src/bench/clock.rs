@@ -24,8 +24,8 @@ pub struct ClockConstants {
     pub ms_per_node: f64,
     /// Bytes of files that are read and decoded in a millisecond, above 0.
     pub load_bytes_per_ms: f64,
-    /// `c_textured` as measured: the time of a textured triangle over that of a textured and an
-    /// untextured one together, 0 to 1. For `hlod-build --textured-weight`.
+    /// `c_textured`: the time of a textured triangle over that of a textured and an untextured
+    /// one together, 0 to 1. Costs follow from it, whatever the build took it for.
     pub textured_weight: f64,
 }
 
@@ -39,7 +39,7 @@ impl Default for ClockConstants {
             ms_per_cost,
             ms_per_node: 0.01,
             load_bytes_per_ms: 40_000.0,
-            textured_weight: 0.5,
+            textured_weight: 0.6,
         }
     }
 }

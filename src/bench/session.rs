@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use super::{BenchOptions, ClockConstants, Context, FrameRecord, ModelWorld, Replay, Run, run};
+use crate::Result;
 use crate::camera::CameraPath;
 use crate::format::Scene;
 use crate::loading::NodeFiles;
@@ -11,7 +12,6 @@ use crate::render::content::{held_bytes, picture_bytes};
 use crate::runtime::lakhia::Lakhia;
 use crate::runtime::residency::{Residency, Sizes};
 use crate::runtime::{Policy, SceneTree};
-use crate::{Error, Result};
 
 /// A built scene that is open for runs.
 #[derive(Clone, Debug)]
@@ -42,6 +42,11 @@ impl Session {
     /// The files of the scene.
     pub fn files(&self) -> NodeFiles {
         NodeFiles::new(&self.dir, Arc::clone(&self.scene))
+    }
+
+    /// The hierarchy with the costs of a machine.
+    fn tree_for(&self, constants: &ClockConstants) -> SceneTree {
+        self.tree.clone().with_textured_weight(&self.scene, constants.textured_weight)
     }
 
     fn residency(&self, options: &BenchOptions) -> Result<Arc<Mutex<Residency>>> {
@@ -75,10 +80,11 @@ impl Session {
         options.selection.time = constants.time_model();
         options.check()?;
         let mut policy = Lakhia::new(options.selection);
+        let tree = self.tree_for(&constants);
         let context = Context { constants, ..self.context(options, path, &policy) };
-        let mut world = ModelWorld::new(&self.tree, constants);
+        let mut world = ModelWorld::new(&tree, constants);
         let replay = Replay {
-            tree: &self.tree,
+            tree: &tree,
             path,
             policy: &mut policy,
             residency: self.residency(&options)?,
@@ -103,7 +109,9 @@ impl Session {
         progress: impl FnMut(&FrameRecord) -> bool,
     ) -> Result<(Run, Context)> {
         options.check()?;
-        let measured = self.time_roots(renderer, path)?;
+        let weight = constants.unwrap_or_default();
+        let tree = self.tree_for(&weight);
+        let measured = self.time_roots(renderer, &tree, path)?;
         let constants = constants.unwrap_or(ClockConstants {
             fixed_ms: measured.fixed_ms,
             ms_per_cost: measured.ms_per_cost,
@@ -113,8 +121,9 @@ impl Session {
         // The overhead is that of this machine and this size of picture in any case.
         options.selection.time.fixed_ms = measured.fixed_ms;
         let mut policy = Lakhia::new(options.selection);
-        let adapter = serde_json::to_value(renderer.adapter())
-            .map_err(|error| Error::Internal(format!("an adapter without JSON form: {error}")))?;
+        let adapter = serde_json::to_value(renderer.adapter()).map_err(|error| {
+            crate::Error::Internal(format!("an adapter without JSON form: {error}"))
+        })?;
         let mut context = Context {
             constants,
             clock: "wall",
@@ -122,15 +131,10 @@ impl Session {
             ..self.context(options, path, &policy)
         };
         let residency = self.residency(&options)?;
-        let mut world = super::WallWorld::new(
-            &self.tree,
-            self.files(),
-            renderer,
-            Arc::clone(&residency),
-            snapshots,
-        );
+        let mut world =
+            super::WallWorld::new(&tree, self.files(), renderer, Arc::clone(&residency), snapshots);
         let replay = Replay {
-            tree: &self.tree,
+            tree: &tree,
             path,
             policy: &mut policy,
             residency,
@@ -158,6 +162,7 @@ impl Session {
     fn time_roots(
         &self,
         renderer: &mut crate::render::Renderer,
+        tree: &SceneTree,
         path: &CameraPath,
     ) -> Result<crate::runtime::lakhia::TimeModel> {
         let files = self.files();
@@ -173,7 +178,7 @@ impl Session {
             renderer.upload(root, 0, &arrival.content)?;
             front.push(root);
         }
-        let measured = super::measure_start(renderer, &self.tree, path, &front)?;
+        let measured = super::measure_start(renderer, tree, path, &front)?;
         front.iter().for_each(|&root| renderer.remove(root));
         (0..held.len() as u32).for_each(|texture| renderer.remove_shared(texture));
         Ok(measured)

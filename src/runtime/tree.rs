@@ -11,7 +11,7 @@ use crate::format::Scene;
 pub struct TreeNode {
     /// Least and greatest source coordinates.
     pub bbox: [DVec3; 2],
-    /// Eq. 3.1 of the thesis.
+    /// Eq. 3.1 of the thesis, for the machine at hand.
     pub cost: f64,
     /// Benefit at a distance of 1 m, metres.
     pub static_benefit: f64,
@@ -60,6 +60,17 @@ impl SceneTree {
         }
         let [min, max] = scene.bounds().unwrap_or_default().map(DVec3::from);
         Self { nodes, children, roots: scene.roots().collect(), diagonal: (max - min).length() }
+    }
+
+    /// Computes costs anew (eq. 3.1) with another `c_textured` than that of the build: how much
+    /// more a textured triangle costs than another depends on what draws.
+    pub fn with_textured_weight(mut self, scene: &Scene, textured_weight: f64) -> Self {
+        for (node, entry) in self.nodes.iter_mut().zip(&scene.nodes) {
+            let textured = f64::from(entry.textured_triangles);
+            let untextured = f64::from(entry.triangles) - textured;
+            node.cost = textured * textured_weight + untextured * (1.0 - textured_weight);
+        }
+        self
     }
 
     /// Number of nodes.

@@ -5,39 +5,39 @@ use super::{LakhiaOptions, ShareFeedback};
 /// `shareTime` stays within these multiples of the time that the target leaves for nodes.
 const SHARE_RANGE: [f64; 2] = [0.01, 1000.0];
 
-/// Siblings whose share exceeds or misses what they need by this part are on their way up or down.
-const ON_THE_WAY: f64 = 0.1;
-
-/// What a frame's siblings would do to the time of later frames.
+/// What a frame's siblings will do to the time of later frames, if nothing else changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Outlook {
-    /// Milliseconds that the cheapest of the siblings refused by their counters would add;
-    /// infinite where none was.
+    /// Milliseconds that siblings will add that are refused by their counters, which rise.
+    pub coming_ms: f64,
+    /// Milliseconds that the cheapest of the other refused siblings would add; infinite where
+    /// there are none.
     pub refused_ms: f64,
-    /// The same of those whose counters are on their way up.
-    pub rising_ms: f64,
-    /// Siblings are drawn whose counters are on their way down.
-    pub falling: bool,
+    /// Milliseconds that siblings will give back whose counters fall.
+    pub going_ms: f64,
 }
 
 impl Outlook {
     /// Before any siblings were visited.
-    pub const NONE: Self =
-        Self { refused_ms: f64::INFINITY, rising_ms: f64::INFINITY, falling: false };
+    pub const NONE: Self = Self { coming_ms: 0.0, refused_ms: f64::INFINITY, going_ms: 0.0 };
 
-    /// Siblings in memory were refused that would add `more_ms`; `plenty` is the part by which
-    /// their share exceeds what they need.
-    pub fn refused(&mut self, more_ms: f64, plenty: f64) {
+    /// Siblings in memory were refused that take `more_ms` more than their parent; `rising` says
+    /// that their counters are on their way to let them in.
+    pub fn refused(&mut self, more_ms: f64, rising: bool) {
         let more_ms = more_ms.max(0.0);
-        self.refused_ms = self.refused_ms.min(more_ms);
-        if plenty > ON_THE_WAY {
-            self.rising_ms = self.rising_ms.min(more_ms);
+        if rising {
+            self.coming_ms += more_ms;
+        } else {
+            self.refused_ms = self.refused_ms.min(more_ms);
         }
     }
 
-    /// Siblings were drawn or passed.
-    pub fn accepted(&mut self, plenty: f64) {
-        self.falling |= plenty < -ON_THE_WAY;
+    /// Siblings were drawn or passed that take `more_ms` more than their parent; `falling` says
+    /// that their counters are on their way to shut them out.
+    pub fn accepted(&mut self, more_ms: f64, falling: bool) {
+        if falling {
+            self.going_ms += more_ms.max(0.0);
+        }
     }
 }
 
@@ -73,12 +73,12 @@ impl Feedback {
         // The second: time that is left goes to nodes that could use it.
         let slack = options.share_slack * options.target_ms;
         let left_ms = options.target_ms - actual_ms;
-        let refused = outlook.refused_ms.is_finite();
+        let refused = outlook.refused_ms.is_finite() || outlook.coming_ms > 0.0;
         let (more, less) = match options.share_feedback {
             ShareFeedback::Plain => (refused && left_ms > slack, left_ms < -slack),
             ShareFeedback::Damped => (
-                outlook.refused_ms <= left_ms && outlook.rising_ms > left_ms,
-                left_ms < -slack && !outlook.falling,
+                outlook.coming_ms + outlook.refused_ms <= left_ms,
+                left_ms + outlook.going_ms < -slack,
             ),
         };
         if more {
@@ -146,13 +146,13 @@ mod tests {
         assert_eq!(share(Damped, CALM, 12.0), 20.0, "nothing was refused");
         assert_eq!(share(Damped, REFUSED, 27.9), 20.2);
         assert_eq!(share(Damped, REFUSED, 28.1), 20.0, "it would not fit");
-        let rising = Outlook { rising_ms: 2.0, ..REFUSED };
-        assert_eq!(share(Damped, rising, 20.0), 20.0, "it is on its way up");
-        let too_much = Outlook { rising_ms: 15.0, ..REFUSED };
-        assert_eq!(share(Damped, too_much, 20.0), 20.2, "what rises is not what would fit");
+        let coming = Outlook { coming_ms: 5.0, ..REFUSED };
+        assert_eq!(share(Damped, coming, 22.9), 20.2, "there is room for both");
+        assert_eq!(share(Damped, coming, 23.1), 20.0, "what is coming takes the room");
         assert_eq!(share(Damped, CALM, 40.0), 19.8);
-        let falling = Outlook { falling: true, ..CALM };
-        assert_eq!(share(Damped, falling, 40.0), 20.0, "it is on its way down");
+        let going = Outlook { going_ms: 9.0, ..CALM };
+        assert_eq!(share(Damped, going, 40.0), 20.0, "what is going suffices");
+        assert_eq!(share(Damped, going, 41.0), 19.8, "what is going does not suffice");
     }
 
     #[test]

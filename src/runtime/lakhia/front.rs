@@ -19,10 +19,19 @@ pub struct Lakhia {
     cost: f64,
     /// What its siblings would do to later frames.
     outlook: Outlook,
+    /// Milliseconds of this frame that nodes met for the first time may still take.
+    room_ms: f64,
     queue: VecDeque<Siblings>,
     /// The siblings at hand.
     seen: Vec<Seen>,
 }
+
+/// Frames within which refused siblings count as coming: their time is not given to others.
+const COMING: f64 = 3000.0;
+
+/// Frames within which siblings count as going: others need not give up time. Counters fall by
+/// less than 1 in a frame, so that this has to exceed their whole range.
+const GOING: f64 = 10_000.0;
 
 /// Nodes that are drawn together or not at all.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +40,19 @@ struct Siblings {
     parent: Option<u32>,
     /// `shareTime`, milliseconds.
     share_ms: f64,
+}
+
+/// What the counters of siblings say.
+#[derive(Clone, Copy, Debug)]
+struct Counted {
+    /// `cumHyst` is not below 0.
+    allowed: bool,
+    /// Milliseconds that all siblings in view need.
+    needed_ms: f64,
+    /// It will not be within [`COMING`] frames, if nothing changes.
+    rising: bool,
+    /// It will be within [`GOING`] frames, if nothing changes.
+    falling: bool,
 }
 
 impl Lakhia {
@@ -42,6 +64,7 @@ impl Lakhia {
             hysteresis: Hysteresis::default(),
             cost: 0.0,
             outlook: Outlook::NONE,
+            room_ms: 0.0,
             queue: VecDeque::new(),
             seen: Vec::new(),
         }
@@ -70,7 +93,8 @@ impl Lakhia {
             }
             self.seen.push(seen);
         }
-        let (allowed, needed_ms) = self.update_counters(tree, members, siblings.share_ms, sum);
+        let Counted { allowed, needed_ms, rising, falling } =
+            self.update_counters(tree, members, siblings, sum);
         let resident = || {
             members.iter().zip(&self.seen).all(|(&node, seen)| {
                 residents.contains(node) || !(seen.visible || self.options.all_siblings)
@@ -81,12 +105,13 @@ impl Lakhia {
             if !(allowed && resident) {
                 if resident {
                     let more_ms = needed_ms - self.feedback.v_time * tree.node(parent).cost;
-                    self.outlook.refused(more_ms, siblings.share_ms / needed_ms - 1.0);
+                    self.outlook.refused(more_ms, rising);
                 }
                 self.draw(tree, parent, out);
                 return;
             }
-            self.outlook.accepted(siblings.share_ms / needed_ms - 1.0);
+            let more_ms = needed_ms - self.feedback.v_time * tree.node(parent).cost;
+            self.outlook.accepted(more_ms, falling);
         }
         // Roots have no parent that could stand for them: far ones that need more than their
         // share do not keep the near ones from going on.
@@ -105,35 +130,47 @@ impl Lakhia {
         }
     }
 
-    /// Time slices (eq. 4.1) against the time needed: whether `cumHyst` is not below 0, and the
-    /// milliseconds that all siblings in view need.
+    /// Time slices (eq. 4.1) against the time needed.
     fn update_counters(
         &mut self,
         tree: &SceneTree,
         members: &[u32],
-        share_ms: f64,
+        siblings: Siblings,
         sum: f64,
-    ) -> (bool, f64) {
+    ) -> Counted {
+        let share_ms = siblings.share_ms;
         let visible = || members.iter().zip(&self.seen).filter(|(_, seen)| seen.visible);
         let time_needed = |node: u32| self.feedback.v_time * tree.node(node).cost;
         let count = visible().count();
         let needed_ms = visible().map(|(&node, _)| time_needed(node)).sum::<f64>();
         if visible().any(|(&node, _)| self.hysteresis.is_new(node)) {
-            let affordable = share_ms > needed_ms;
+            let parent_ms = siblings.parent.map_or(0.0, time_needed);
+            let affordable = share_ms > needed_ms && needed_ms - parent_ms <= self.room_ms;
+            if affordable {
+                self.room_ms -= (needed_ms - parent_ms).max(0.0);
+            }
             for (&node, _) in members.iter().zip(&self.seen).filter(|(_, seen)| seen.visible) {
                 if self.hysteresis.is_new(node) {
                     self.hysteresis.start(node, affordable, &self.options);
                 }
             }
         }
-        let mut cumulative = 0.0;
+        let (mut cumulative, mut coming, mut going) = (0.0, 0.0, 0.0);
         for (&node, seen) in members.iter().zip(&self.seen).filter(|(_, seen)| seen.visible) {
             let time_slice = share_ms * share(seen.priority, sum, count);
             let time_needed = self.feedback.v_time * tree.node(node).cost;
             self.hysteresis.update(node, time_slice, time_needed, self.options.hyst_limit);
-            cumulative += self.hysteresis.truncated(node, self.options.hyst_switch);
+            cumulative += self.hysteresis.truncated(node, 0.0, &self.options);
+            let urgency = time_slice / time_needed - 1.0;
+            coming += self.hysteresis.truncated(node, urgency * COMING, &self.options);
+            going += self.hysteresis.truncated(node, urgency * GOING, &self.options);
         }
-        (cumulative >= 0.0, needed_ms)
+        Counted {
+            allowed: cumulative >= 0.0,
+            needed_ms,
+            rising: coming >= 0.0,
+            falling: going < 0.0,
+        }
     }
 
     fn draw(&mut self, tree: &SceneTree, node: u32, out: &mut Selection) {
@@ -161,6 +198,8 @@ impl Policy for Lakhia {
     ) {
         out.clear();
         self.hysteresis.resize(tree.len());
+        let before_ms = self.options.time.fixed_ms + self.feedback.v_time * self.cost;
+        self.room_ms = self.options.target_ms - before_ms;
         (self.cost, self.outlook) = (0.0, Outlook::NONE);
         self.queue.clear();
         self.queue.push_back(Siblings { parent: None, share_ms: self.feedback.share_ms });

@@ -40,9 +40,13 @@ impl Hysteresis {
         *counter = (*counter + urgency).clamp(-limit, limit);
     }
 
-    /// `trunc(hyst / c_hystSwitch)`, which siblings sum up to `cumHyst`.
-    pub fn truncated(&self, node: u32, switch: f64) -> f64 {
-        (self.counters[node as usize] / switch).trunc()
+    /// `trunc(hyst / c_hystSwitch)`, which siblings sum up to `cumHyst`, once the counter has
+    /// moved on by `change`.
+    pub fn truncated(&self, node: u32, change: f64, options: &LakhiaOptions) -> f64 {
+        let LakhiaOptions { hyst_switch, hyst_limit, .. } = *options;
+        let counter = (self.counters[node as usize] + change).clamp(-hyst_limit, hyst_limit);
+        // A change of infinitely much times nothing is none.
+        if counter.is_nan() { 0.0 } else { (counter / hyst_switch).trunc() }
     }
 }
 
@@ -84,7 +88,9 @@ mod tests {
             [(1499.0, 0.0), (1500.0, 1.0), (4510.0, 3.0), (-1499.0, 0.0), (-1500.0, -1.0)]
         {
             hysteresis.counters[0] = counter;
-            assert_eq!(hysteresis.truncated(0, 1500.0), expected, "{counter}");
+            let options = LakhiaOptions::default();
+            assert_eq!(hysteresis.truncated(0, 0.0, &options), expected, "{counter}");
+            assert_eq!(hysteresis.truncated(0, f64::INFINITY, &options), 3.0);
         }
     }
 
