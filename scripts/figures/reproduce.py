@@ -1,0 +1,158 @@
+"""Replays paths over cities and sets the figures beside the thesis's; see scripts/reproduce."""
+
+import argparse
+import json
+import subprocess
+
+from common import ROOT, Programs, machine, real_data, run, say, table, write_between_markers
+
+# The thesis's city has 25 blocks in its largest experiment; as many triangles as fit a small
+# machine and a run of minutes.
+BLOCKS = 25
+TRIANGLES = 2_000_000
+REAL = ["oblique_a", "sceaux", "hamada"]
+KINDS = ["walk", "drive", "fly", "still", "shake"]
+# Frames before the log begins: what the thesis measures has settled.
+SETTLE = 300
+# (mean, deviation) of estimate against actual in percent, toggles per frame, share of memory.
+THESIS = {
+    "walk": {"error": "−2.01 ± 3.89", "without": "4.39 ± 15.19", "toggles": "1 in 133"},
+    "drive": {"toggles": "1 in 11"},
+}
+
+
+def main():
+    arguments = parse()
+    programs = Programs(features=True)
+    scenes = [("city", [programs.city("city-25", **city_options(arguments))])]
+    scenes += [(name, models) for name in REAL if (models := real_data(name))]
+    rows, notes = [], []
+    for name, models in scenes:
+        out = programs.work / f"scene-{name}"
+        run([programs.path("hlod-build"), "--quiet", *map(str, models), str(out)])
+        for kind in KINDS:
+            rows.append(measure(programs, arguments, name, out, kind))
+        notes.append(capped(programs, arguments, name, out))
+    text = "\n\n".join(
+        part.strip("\n")
+        for part in [machine(), conditions(arguments, rows), results(rows), memory(notes)]
+    )
+    print(text)
+    if arguments.write:
+        write_between_markers(ROOT / "docs" / "runs.md", "runs", text)
+        write_between_markers(ROOT / "README.md", "runs", text)
+
+
+def parse():
+    parser = argparse.ArgumentParser(prog="reproduce", description=__doc__)
+    parser.add_argument("--frames", type=int, default=900, help="frames of each path [900]")
+    parser.add_argument("--clock", choices=["wall", "model"], default="wall")
+    parser.add_argument(
+        "--quick", action="store_true", help="a small city, 60 frames, nothing written"
+    )
+    parser.add_argument(
+        "--no-write", dest="write", action="store_false", help="print only, leave docs as they are"
+    )
+    arguments = parser.parse_args()
+    if arguments.quick:
+        arguments.frames, arguments.write = 60, False
+    return arguments
+
+
+def city_options(arguments):
+    triangles = 100_000 if arguments.quick else TRIANGLES
+    return {"blocks": BLOCKS, "triangles": triangles, "texels_per_triangle": 17}
+
+
+def measure(programs, arguments, name, out, kind, *options):
+    """One run: the summary, with the names of scene and path."""
+    bench = programs.path("hlod-bench")
+    path = programs.work / f"{name}-{kind}.csv"
+    frames = str(arguments.frames)
+    subprocess.run(
+        [bench, "make-path", str(out), "--kind", kind, "--frames", frames, "--out", str(path)],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
+    say(f"{name}, {kind}")
+    results_dir = programs.work / f"run-{name}-{kind}"
+    settle = min(SETTLE, arguments.frames)
+    command = [bench, str(out), str(path), "--quiet", "--clock", arguments.clock]
+    command += ["--settle-frames", str(settle), "--out", str(results_dir), *options]
+    run(command)
+    summary = json.loads((results_dir / "summary.json").read_text())
+    return {"scene": name, "kind": kind, **summary}
+
+
+def capped(programs, arguments, name, out):
+    """A flight under a cap of a quarter of what the whole scene takes, but at least the roots."""
+    free = measure(programs, arguments, name, out, "orbit", "--max-memory", "64GiB")
+    roots = free["memory"]["start_bytes"]
+    cap = max(free["memory"]["peak_bytes"] // 2, 2 * roots)
+    return measure(programs, arguments, name, out, "orbit", "--max-memory", str(cap))
+
+
+def conditions(arguments, rows):
+    adapter = rows[0]["adapter"]
+    drawn = f"drawn by {adapter['name']}" if adapter else "by the model clock"
+    return (
+        f"Target 30 ms, 1280 × 720, {drawn}, {arguments.frames} frames a path after "
+        f"{min(SETTLE, arguments.frames)} frames at its first pose, all constants as in the "
+        "thesis's table 6.1. *Error* is (actual − estimated) / estimated, mean ± deviation. *Late* "
+        "are frames over the target by more than a tenth. In brackets: the thesis's figures."
+    )
+
+
+def results(rows):
+    head = ["scene, path", "error, %", "without feedback, %", "toggles", "frame, ms: mean / p95"]
+    head += ["late, %", "target used, %", "visited", "select, ms"]
+    body = []
+    for row in rows:
+        thesis = THESIS.get(row["kind"], {})
+        body.append(
+            [
+                f"{row['scene']}, {row['kind']}",
+                beside(error(row), thesis.get("error")),
+                beside(error(row["without_feedback"]), thesis.get("without")),
+                beside(toggles(row), thesis.get("toggles")),
+                f"{row['frame_ms']['mean']:.1f} / {row['frame_ms']['p95']:.1f}",
+                f"{row['late_share'] * 100:.1f}",
+                f"{row['utilisation'] * 100:.0f}",
+                f"{row['visited_mean']:.0f}",
+                f"{row['select_ms']['mean']:.3f}",
+            ]
+        )
+    return table(head, body)
+
+
+def beside(own, thesis):
+    return f"{own} ({thesis})" if thesis else own
+
+
+def error(row):
+    figures = row["estimate_error_percent"]
+    return f"{figures['mean']:.2f} ± {figures['sd']:.2f}".replace("-", "−")
+
+
+def toggles(row):
+    frames = row["toggles"]["frames_per_toggle"]
+    return "none" if frames is None else f"1 in {frames:.0f}"
+
+
+def memory(rows):
+    head = ["scene, orbit under a cap", "cap, MiB", "peak, MiB", "of the cap, %", "made room"]
+    body = [
+        [
+            row["scene"],
+            f"{row['memory']['cap_bytes'] / 2**20:.1f}",
+            f"{row['memory']['peak_bytes'] / 2**20:.1f}",
+            f"{row['memory']['peak_share'] * 100:.1f} (93)",
+            f"{row['loading']['evictions']}",
+        ]
+        for row in rows
+    ]
+    return table(head, body)
+
+
+if __name__ == "__main__":
+    main()
