@@ -7,6 +7,9 @@ use serde_json::{Value, json};
 use super::statistics::{deviation, mean, percentile};
 use super::{BenchOptions, FrameRecord, Run};
 
+/// The version of the format of `summary.json`, raised where a key changes its meaning.
+pub const SUMMARY_VERSION: u32 = 1;
+
 /// Above the target by more than this part counts as late.
 const LATE: f64 = 0.1;
 
@@ -61,6 +64,7 @@ pub fn summary(run: &Run, context: &Context) -> Value {
         })
     };
     json!({
+        "format_version": SUMMARY_VERSION,
         "version": env!("CARGO_PKG_VERSION"),
         "scene_fingerprint": context.scene_fingerprint,
         "path_fingerprint": context.path_fingerprint,
