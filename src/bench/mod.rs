@@ -6,6 +6,7 @@ mod model;
 mod options;
 mod record;
 mod replay;
+mod report;
 mod session;
 mod statistics;
 mod summary;
@@ -24,6 +25,7 @@ pub use model::ModelWorld;
 pub use options::{BenchOptions, Pace, Size};
 pub use record::FrameRecord;
 pub use replay::{Drawn, Replay, Run, World, run};
+pub use report::report_html;
 pub use session::Session;
 pub use summary::{Context, SUMMARY_VERSION, summary, summary_text};
 #[cfg(feature = "render")]
