@@ -1,10 +1,12 @@
 //! Replays camera paths over a built scene and logs what a user would have felt.
 
 mod clock;
+mod compare;
 mod model;
 mod options;
 mod record;
 mod replay;
+mod report;
 mod session;
 mod statistics;
 mod summary;
@@ -15,12 +17,17 @@ mod wall;
 mod write;
 
 pub use clock::{CLOCK_FILE_VERSION, ClockConstants};
+pub use compare::{
+    Bytes, Comparison, Count, Dimension, Limit, Limits, Milliseconds, Points, Row, SummaryFile,
+    Unit, compare,
+};
 pub use model::ModelWorld;
 pub use options::{BenchOptions, Pace, Size};
 pub use record::FrameRecord;
 pub use replay::{Drawn, Replay, Run, World, run};
+pub use report::report_html;
 pub use session::Session;
-pub use summary::{Context, summary, summary_text};
+pub use summary::{Context, SUMMARY_VERSION, summary, summary_text};
 #[cfg(feature = "render")]
 pub use wall::{Snapshots, WallWorld, calibrate, measure_start};
 pub use write::write_run;

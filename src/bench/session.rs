@@ -57,6 +57,8 @@ impl Session {
 
     fn context(&self, options: BenchOptions, path: &CameraPath, policy: &dyn Policy) -> Context {
         Context {
+            scene_name: self.dir.display().to_string(),
+            path_name: String::new(), // a path does not know where it is from
             options,
             policy: policy.name(),
             clock: "model",

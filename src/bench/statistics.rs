@@ -1,4 +1,7 @@
 //! Means, deviations and percentiles.
+//!
+//! By hand: of the crates for it, `statrs` interpolates percentiles (and needs a newer compiler
+//! than this crate) and `average` estimates them, so neither gives a value that some frame had.
 
 /// The mean; 0 of nothing.
 pub(super) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {

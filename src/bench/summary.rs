@@ -7,12 +7,20 @@ use serde_json::{Value, json};
 use super::statistics::{deviation, mean, percentile};
 use super::{BenchOptions, FrameRecord, Run};
 
+/// The version of the format of `summary.json`, raised where a key changes its meaning.
+pub const SUMMARY_VERSION: u32 = 1;
+
 /// Above the target by more than this part counts as late.
 const LATE: f64 = 0.1;
 
 /// What a summary says of a run beside its frames.
 #[derive(Clone, Debug)]
 pub struct Context {
+    /// The scene as a person named it; for the report only, so that summaries of the same run
+    /// are the same wherever it lies.
+    pub scene_name: String,
+    /// The path as a person named it, or nothing; for the report only.
+    pub path_name: String,
     /// What determined the run.
     pub options: BenchOptions,
     /// Name of the policy.
@@ -61,6 +69,7 @@ pub fn summary(run: &Run, context: &Context) -> Value {
         })
     };
     json!({
+        "format_version": SUMMARY_VERSION,
         "version": env!("CARGO_PKG_VERSION"),
         "scene_fingerprint": context.scene_fingerprint,
         "path_fingerprint": context.path_fingerprint,
@@ -124,13 +133,14 @@ pub fn summary(run: &Run, context: &Context) -> Value {
 }
 
 /// `(actual − estimated) / estimated` in percent: below 0 where estimates were cautious, as in
-/// the thesis (section 6.3).
+/// the thesis (section 6.3). `None` where nothing was estimated.
+pub(super) fn error_percent(actual_ms: f64, estimated_ms: f64) -> Option<f64> {
+    (estimated_ms > 0.0).then(|| (actual_ms / estimated_ms - 1.0) * 100.0)
+}
+
 fn error(frames: &[FrameRecord], estimate: fn(&FrameRecord) -> f64) -> Value {
-    let errors: Vec<f64> = frames
-        .iter()
-        .filter(|frame| estimate(frame) > 0.0)
-        .map(|frame| (frame.actual_ms / estimate(frame) - 1.0) * 100.0)
-        .collect();
+    let errors: Vec<f64> =
+        frames.iter().filter_map(|frame| error_percent(frame.actual_ms, estimate(frame))).collect();
     json!({ "mean": mean(errors.iter().copied()), "sd": deviation(&errors) })
 }
 

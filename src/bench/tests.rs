@@ -80,6 +80,22 @@ fn replay(scene: &Scene, path: &CameraPath, options: BenchOptions) -> Run {
     run(replay, |_| true).unwrap()
 }
 
+fn context(options: BenchOptions) -> Context {
+    Context {
+        scene_name: "street".into(),
+        path_name: "walk.csv".into(),
+        options,
+        policy: "lakhia",
+        clock: "model",
+        constants: constants(),
+        scene_fingerprint: "f".into(),
+        path_fingerprint: "p".into(),
+        adapter: None,
+        broken: Vec::new(),
+        levels: 3,
+    }
+}
+
 #[test]
 fn the_same_run_gives_the_same_bytes() {
     let (scene, path) = (street(20), walk(200));
@@ -154,17 +170,7 @@ fn frames_of_settling_are_not_logged() {
 #[test]
 fn a_summary_has_the_promised_keys_and_agrees_with_the_frames() {
     let run = replay(&street(20), &walk(300), options(1 << 20));
-    let context = Context {
-        options: options(1 << 20),
-        policy: "lakhia",
-        clock: "model",
-        constants: constants(),
-        scene_fingerprint: "f".into(),
-        path_fingerprint: "p".into(),
-        adapter: None,
-        broken: Vec::new(),
-        levels: 3,
-    };
+    let context = context(options(1 << 20));
     let summary = summary(&run, &context);
     for key in [
         "/frames",
@@ -195,4 +201,28 @@ fn a_summary_has_the_promised_keys_and_agrees_with_the_frames() {
     assert!(summary["estimate_error_percent"]["mean"].as_f64().unwrap().abs() < 1e-9);
     let text = summary_text(&summary);
     assert!(text.lines().count() < 24 && !text.contains("NaN"), "{text}");
+}
+
+#[test]
+fn a_run_is_written_whole_and_compares_with_itself_and_not_with_another_target() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, options: BenchOptions| {
+        let (run, context) = (replay(&street(20), &walk(100), options), context(options));
+        let out = dir.path().join(name);
+        let summary = summary(&run, &context);
+        let files = write_run(&out, &run, &context, &summary).unwrap();
+        assert!(files.iter().all(|file| file.is_file()));
+        let names = files.iter().map(|file| file.file_name().unwrap().to_str().unwrap());
+        assert_eq!(names.collect::<Vec<_>>(), ["frames.csv", "summary.json", "report.html"]);
+        SummaryFile::read(&out.join("summary.json")).unwrap()
+    };
+    let mut other = options(1 << 20);
+    let [first, second] = ["first", "second"].map(|name| write(name, other));
+    let none = "0".parse().unwrap();
+    let limits = Limits { max_toggle_increase: Some(none), ..Limits::default() };
+    let comparison = compare(&first, &second, &limits, false).unwrap();
+    assert!(!comparison.exceeded() && comparison.differences.is_empty());
+    other.selection.target_ms = 2.0;
+    let error = compare(&first, &write("third", other), &limits, false).unwrap_err();
+    assert!(error.to_string().contains("parameters.selection.target_ms: 3.0 against 2.0"));
 }

@@ -1,15 +1,15 @@
-//! Writes what a run gave: `frames.csv` and `summary.json`.
+//! Writes what a run gave: `frames.csv`, `summary.json` and `report.html`.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::{Context, FrameRecord, Run};
+use super::{Context, FrameRecord, Run, report_html};
 use crate::{Error, Result};
 
-/// Writes `frames.csv` and `summary.json` into a folder, which is made where it is missing; each
-/// beside and renamed. The paths of the files.
+/// Writes `frames.csv`, `summary.json` and `report.html` into a folder, which is made where it is
+/// missing; each beside and renamed. The paths of the files.
 pub fn write_run(
     dir: &Path,
     run: &Run,
@@ -24,7 +24,9 @@ pub fn write_run(
     let text = serde_json::to_string_pretty(summary)
         .map_err(|error| Error::Internal(format!("a summary that has no JSON form: {error}")))?;
     write_beside(&json, (text + "\n").as_bytes())?;
-    Ok(vec![frames, json])
+    let report = dir.join("report.html");
+    write_beside(&report, report_html(run, context, summary)?.as_bytes())?;
+    Ok(vec![frames, json, report])
 }
 
 /// The frames as CSV.

@@ -1,0 +1,179 @@
+//! Compares a run with an earlier one, for people and for their CI.
+
+mod limit;
+mod metrics;
+mod options;
+mod summary_file;
+#[cfg(test)]
+mod tests;
+
+use std::fmt::Write;
+
+use serde_json::{Value, json};
+
+use crate::{Error, Result};
+pub use limit::{Bytes, Count, Dimension, Limit, Milliseconds, Points};
+use metrics::METRICS;
+pub use metrics::Unit;
+pub use options::Limits;
+pub use summary_file::SummaryFile;
+
+/// What became of the figures from one run to another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// In what the runs themselves differ; empty unless that was to be passed over.
+    pub differences: Vec<String>,
+    /// One a figure.
+    pub rows: Vec<Row>,
+}
+
+/// One figure of two runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// What it is.
+    pub metric: &'static str,
+    /// What it is in.
+    pub unit: Unit,
+    /// What it was; NaN where the run had none.
+    pub base: f64,
+    /// What it is now; NaN where the run has none.
+    pub new: f64,
+    /// How much it may rise, as that was given.
+    pub limit: Option<String>,
+    /// It rose by more.
+    pub exceeded: bool,
+}
+
+/// Compares two runs. Those over different scenes, paths or parameters are refused unless `force`
+/// says to compare them all the same.
+pub fn compare(
+    base: &SummaryFile,
+    new: &SummaryFile,
+    limits: &Limits,
+    force: bool,
+) -> Result<Comparison> {
+    let differences = summary_file::differences(base, new)?;
+    if !(differences.is_empty() || force) {
+        return Err(Error::Usage(format!(
+            "{} and {} are not runs of the same thing:\n  {}\nFigures of runs that differ in \
+             these say nothing about the program; --force compares them all the same",
+            base.path.display(),
+            new.path.display(),
+            differences.join("\n  ")
+        )));
+    }
+    let rows = METRICS.iter().map(|metric| {
+        let figure = |file: &SummaryFile| -> Result<f64> {
+            let values: Vec<f64> =
+                metric.keys.iter().map(|key| file.number(key)).collect::<Result<_>>()?;
+            let value = values.iter().sum::<f64>() * metric.scale;
+            Ok(if metric.magnitude { value.abs() } else { value })
+        };
+        let (base, new) = (figure(base)?, figure(new)?);
+        let verdict = (metric.judge)(limits, base, new);
+        Ok(Row {
+            metric: metric.name,
+            unit: metric.unit,
+            base,
+            new,
+            exceeded: verdict.as_ref().is_some_and(|verdict| verdict.exceeded),
+            limit: verdict.map(|verdict| verdict.limit),
+        })
+    });
+    Ok(Comparison { differences, rows: rows.collect::<Result<_>>()? })
+}
+
+impl Row {
+    /// How much it rose.
+    pub fn change(&self) -> f64 {
+        self.new - self.base
+    }
+
+    /// How much it rose in percent of what it was; `None` where it was 0 and is not, or where
+    /// either is no number.
+    pub fn change_percent(&self) -> Option<f64> {
+        let percent = match self.change() {
+            0.0 => 0.0,
+            change => change / self.base.abs() * 100.0,
+        };
+        percent.is_finite().then_some(percent)
+    }
+
+    /// A value of this figure as text, with a sign where it is a change.
+    fn text(&self, value: f64, signed: bool) -> String {
+        let (value, digits, unit) = match self.unit {
+            _ if !value.is_finite() => return "-".into(),
+            Unit::Count if value.fract() == 0.0 => (value, 0, ""),
+            Unit::Count => (value, 1, ""),
+            Unit::Ms => (value, 3, " ms"),
+            Unit::Bytes => (value / f64::from(1 << 20), 2, " MiB"),
+            Unit::Percent => (value, 2, " %"),
+        };
+        if signed { format!("{value:+.digits$}{unit}") } else { format!("{value:.digits$}{unit}") }
+    }
+}
+
+impl Comparison {
+    /// Whether any limit was exceeded.
+    pub fn exceeded(&self) -> bool {
+        self.rows.iter().any(|row| row.exceeded)
+    }
+
+    /// A table for a person.
+    pub fn text(&self) -> String {
+        let header = ["metric", "base", "new", "change", "change %", "limit"].map(String::from);
+        let lines: Vec<[String; 6]> = std::iter::once(header)
+            .chain(self.rows.iter().map(|row| {
+                let percent = row.change_percent();
+                let limit = match (&row.limit, row.exceeded) {
+                    (None, _) => String::new(),
+                    (Some(limit), false) => limit.clone(),
+                    (Some(limit), true) => format!("{limit} EXCEEDED"),
+                };
+                [
+                    row.metric.into(),
+                    row.text(row.base, false),
+                    row.text(row.new, false),
+                    row.text(row.change(), true),
+                    percent.map_or_else(|| "-".into(), |percent| format!("{percent:+.1} %")),
+                    limit,
+                ]
+            }))
+            .collect();
+        let width = |column: usize| {
+            lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0)
+        };
+        let widths: [usize; 6] = std::array::from_fn(width);
+        let mut out = String::new();
+        for [metric, numbers @ .., limit] in &lines {
+            let mut line = format!("{metric:<0$}", widths[0]);
+            for (number, width) in numbers.iter().zip(&widths[1..]) {
+                // Writing to a string cannot fail.
+                let _ = write!(line, "  {number:>width$}");
+            }
+            let _ = writeln!(out, "{}", format!("{line}  {limit}").trim_end());
+        }
+        for difference in &self.differences {
+            let _ = writeln!(out, "not the same run: {difference}");
+        }
+        out
+    }
+
+    /// The same for programs. Bytes are bytes and shares are percent here too.
+    pub fn to_json(&self) -> Value {
+        json!({
+            "exceeded": self.exceeded(),
+            "differences": self.differences,
+            "metrics": self.rows.iter().map(|row| json!({
+                "metric": row.metric,
+                "unit": row.unit,
+                "base": row.base,
+                "new": row.new,
+                "change": row.change(),
+                "change_percent": row.change_percent(),
+                "limit": row.limit,
+                "exceeded": row.exceeded,
+            })).collect::<Vec<_>>(),
+        })
+    }
+}
