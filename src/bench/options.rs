@@ -55,6 +55,7 @@ impl BenchOptions {
                 (0.0..1.0).contains(&selection.share_gain),
                 "0 to 1, 1 excluded",
             ),
+            ("--share-limit", selection.share_limit, selection.share_limit >= 1.0, "at least 1"),
             ("--share-slack", selection.share_slack, selection.share_slack >= 0.0, "at least 0"),
             (
                 "--evict-margin",

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use hlod::bench::{
-    BenchOptions, ClockConstants, Context, FrameRecord, Pace, Run, Session, Size, summary,
-    summary_text, write_run,
+    BenchOptions, ClockConstants, Context, FrameRecord, Limits, Pace, Run, Session, Size,
+    SummaryFile, compare, summary, summary_text, write_run,
 };
 use hlod::camera::{self, CameraPath, DEFAULT_FPS, Ground, PathKind};
 use hlod::runtime::lakhia::{LakhiaOptions, ShareFeedback, StartOfHysteresis};
@@ -18,15 +18,15 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Replays a camera path over a built scene and logs what a user would have felt.
 ///
 /// Chooses levels of detail for every frame as Lakhia's thesis (2004) describes, loads nodes
-/// beside drawing below a memory cap, draws offscreen, and writes frames.csv and summary.json
-/// into the folder --out.
+/// beside drawing below a memory cap, draws offscreen, and writes frames.csv, summary.json and
+/// report.html into the folder --out.
 #[derive(Parser, Debug)]
 #[command(
     version,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    override_usage = "hlod-bench [OPTIONS] OUT PATH.csv\n       hlod-bench make-path [OPTIONS] OUT --kind KIND --out PATH.csv\n       hlod-bench calibrate [OPTIONS] OUT --out CLOCK.json",
-    after_help = "Examples:\n  hlod-bench make-path out/ --kind walk --out walk.csv\n  hlod-bench out/ walk.csv --target-ms 30\n  hlod-bench out/ walk.csv --clock model --max-memory 256MiB --out bench/walk\n\nExit codes: 0 success, 1 internal error, 2 usage, 3 input missing or invalid (also where a run went on without a node file that cannot be used), 4 output not written, 5 no graphics adapter."
+    override_usage = "hlod-bench [OPTIONS] OUT PATH.csv\n       hlod-bench make-path [OPTIONS] OUT --kind KIND --out PATH.csv\n       hlod-bench calibrate [OPTIONS] OUT --out CLOCK.json\n       hlod-bench compare [OPTIONS] BASE.json NEW.json",
+    after_help = "Examples:\n  hlod-bench make-path out/ --kind walk --out walk.csv\n  hlod-bench out/ walk.csv --target-ms 30\n  hlod-bench out/ walk.csv --clock model --max-memory 256MiB --out bench/walk\n\nExit codes: 0 success, 1 internal error, 2 usage, 3 input missing or invalid (also where a run went on without a node file that cannot be used), 4 output not written, 5 no graphics adapter, 6 compare: a limit was exceeded."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -58,6 +58,21 @@ enum Command {
         /// The file to write
         #[arg(long, value_name = "PATH.csv")]
         out: PathBuf,
+    },
+    /// Compares two runs; exit code 6 where a limit is exceeded
+    Compare {
+        /// summary.json of the run to compare with
+        base: PathBuf,
+        /// summary.json of the run in question
+        new: PathBuf,
+        /// Compare runs over different scenes, paths or parameters all the same
+        #[arg(long)]
+        force: bool,
+        /// One JSON object instead of a table
+        #[arg(long)]
+        json: bool,
+        #[command(flatten)]
+        limits: Limits,
     },
     /// Measures the constants of the model clock on this machine
     Calibrate {
@@ -139,6 +154,10 @@ struct RunArgs {
     /// The part of the target by which frames must miss it before shareTime changes
     #[arg(long, value_name = "PART", default_value_t = 0.05, help_heading = "Selection")]
     share_slack: f64,
+    /// How many times the time for nodes shareTime may be, 1 or more. More: finer where little is
+    /// in view, and later back on target when more comes
+    #[arg(long, value_name = "TIMES", default_value_t = 10.0, help_heading = "Selection")]
+    share_limit: f64,
     /// `plain` as the thesis words it, which swings; `damped` waits for what is on its way
     #[arg(long, value_enum, default_value_t = ShareFeedback::Damped, help_heading = "Selection")]
     share_feedback: ShareFeedback,
@@ -233,6 +252,7 @@ impl RunArgs {
                 v_time_gain: self.v_time_gain,
                 share_gain: self.share_gain,
                 share_slack: self.share_slack,
+                share_limit: self.share_limit,
                 share_feedback: self.share_feedback,
                 ..LakhiaOptions::default()
             },
@@ -252,6 +272,12 @@ impl RunArgs {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match cli.command {
+        Some(Command::Compare { base, new, force, json, limits }) => {
+            match compare_runs(&base, &new, &limits, force, json) {
+                Ok(true) => return ExitCode::from(LIMIT_EXCEEDED),
+                done => done.map(drop),
+            }
+        }
         Some(Command::MakePath { scene, kind, frames, fps, seed, out }) => {
             make_path(&scene, kind, frames, fps, seed, &out)
         }
@@ -267,6 +293,18 @@ fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// The exit code of a comparison that exceeded its limits.
+const LIMIT_EXCEEDED: u8 = 6;
+
+/// True where a limit was exceeded.
+fn compare_runs(base: &Path, new: &Path, limits: &Limits, force: bool, json: bool) -> Result<bool> {
+    let (base, new) = (SummaryFile::read(base)?, SummaryFile::read(new)?);
+    let comparison = compare(&base, &new, limits, force)?;
+    let text = if json { format!("{:#}\n", comparison.to_json()) } else { comparison.text() };
+    print(&text)?;
+    Ok(comparison.exceeded())
 }
 
 fn make_path(
@@ -290,12 +328,13 @@ fn replay(arguments: &RunArgs) -> Result<()> {
         return Err(Error::Usage("expected OUT and PATH.csv".into()));
     };
     let session = Session::open(dir)?;
+    let path_name = path.display().to_string();
     let path = camera::read_path(path, session.scene().up)?;
     let constants = arguments.constants.as_deref().map(ClockConstants::read).transpose()?;
     let options = arguments.options(&session);
     options.check()?;
     let bar = Bar::new(arguments.quiet, path.frames.len());
-    let (run, context) = match arguments.clock {
+    let (run, mut context) = match arguments.clock {
         Clock::Model => {
             let constants = constants.unwrap_or_default();
             session.run_model(&path, options, constants, |frame| bar.frame(frame))?
@@ -303,6 +342,7 @@ fn replay(arguments: &RunArgs) -> Result<()> {
         Clock::Wall => run_wall(arguments, &session, &path, options, constants, &bar)?,
     };
     bar.bar.finish_and_clear();
+    context.path_name = path_name;
     let summary = summary(&run, &context);
     let files = write_run(&arguments.out, &run, &context, &summary)?;
     if !arguments.quiet {

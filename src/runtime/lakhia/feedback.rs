@@ -2,8 +2,8 @@
 
 use super::{LakhiaOptions, ShareFeedback};
 
-/// `shareTime` stays within these multiples of the time that the target leaves for nodes.
-const SHARE_RANGE: [f64; 2] = [0.01, 1000.0];
+/// `shareTime` is never less than this part of the time that the target leaves for nodes.
+const LEAST_SHARE: f64 = 0.01;
 
 /// What a frame's siblings will do to the time of later frames, if nothing else changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,7 +86,8 @@ impl Feedback {
         } else if less {
             self.share_ms *= 1.0 - options.share_gain;
         }
-        let [least, most] = SHARE_RANGE.map(|factor| factor * for_nodes(options));
+        let [least, most] =
+            [LEAST_SHARE, options.share_limit].map(|factor| factor * for_nodes(options));
         self.share_ms = self.share_ms.clamp(least, most);
     }
 }

@@ -35,6 +35,10 @@ pub struct LakhiaOptions {
     /// The part of the target that a frame must miss it by before `shareTime` changes
     /// ("substantially", thesis section 4.2).
     pub share_slack: f64,
+    /// How many times the time that the target leaves for nodes `shareTime` may be, at least 1.
+    /// Near nodes do not use all of theirs, so that more than once can be given out; but what was
+    /// given out is taken back slowly when more comes into view.
+    pub share_limit: f64,
     /// How the second feedback loop is kept from swinging.
     pub share_feedback: ShareFeedback,
     /// What frames are expected to take before any was drawn.
@@ -56,6 +60,7 @@ impl Default for LakhiaOptions {
             v_time_gain: 0.1,
             share_gain: 0.01,
             share_slack: 0.05,
+            share_limit: 10.0,
             share_feedback: ShareFeedback::Damped,
             time: TimeModel::default(),
         }
