@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use super::{BenchOptions, ClockConstants, Context, FrameRecord, ModelWorld, Replay, Run, run};
+use crate::Result;
 use crate::camera::CameraPath;
 use crate::format::Scene;
 use crate::loading::NodeFiles;
@@ -11,7 +12,6 @@ use crate::render::content::{held_bytes, picture_bytes};
 use crate::runtime::lakhia::Lakhia;
 use crate::runtime::residency::{Residency, Sizes};
 use crate::runtime::{Policy, SceneTree};
-use crate::{Error, Result};
 
 /// A built scene that is open for runs.
 #[derive(Clone, Debug)]
@@ -103,6 +103,8 @@ impl Session {
         progress: impl FnMut(&FrameRecord) -> bool,
     ) -> Result<(Run, Context)> {
         options.check()?;
+        // Roots that do not fit are told of before anything is loaded.
+        let residency = self.residency(&options)?;
         let measured = self.time_roots(renderer, path)?;
         let constants = constants.unwrap_or(ClockConstants {
             fixed_ms: measured.fixed_ms,
@@ -113,15 +115,15 @@ impl Session {
         // The overhead is that of this machine and this size of picture in any case.
         options.selection.time.fixed_ms = measured.fixed_ms;
         let mut policy = Lakhia::new(options.selection);
-        let adapter = serde_json::to_value(renderer.adapter())
-            .map_err(|error| Error::Internal(format!("an adapter without JSON form: {error}")))?;
+        let adapter = serde_json::to_value(renderer.adapter()).map_err(|error| {
+            crate::Error::Internal(format!("an adapter without JSON form: {error}"))
+        })?;
         let mut context = Context {
             constants,
             clock: "wall",
             adapter: Some(adapter),
             ..self.context(options, path, &policy)
         };
-        let residency = self.residency(&options)?;
         let mut world = super::WallWorld::new(
             &self.tree,
             self.files(),

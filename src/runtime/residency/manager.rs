@@ -92,6 +92,9 @@ pub struct Residency {
     arrivals: Vec<u32>,
     /// Leaving.
     leaving: Vec<u32>,
+    /// Shared pictures in memory that only a load needed that was given up; drawing lets go of
+    /// them, and their memory is free, at the next frame.
+    orphans: Vec<u32>,
     /// Being read or suspended.
     loading: Vec<u32>,
     /// The load that was given the last portion.
@@ -119,6 +122,7 @@ impl Residency {
             frame: 0,
             arrivals: Vec::new(),
             leaving: Vec::new(),
+            orphans: Vec::new(),
             loading: Vec::new(),
             current: None,
             resident: 0,
@@ -322,7 +326,7 @@ impl Residency {
             return;
         }
         self.end_reading(node);
-        self.forget(node, NodeState::Broken, &mut Vec::new());
+        self.forget_load(node, NodeState::Broken);
         self.list.set_loaded(node, true);
         self.list.remove(node);
     }
@@ -334,6 +338,14 @@ impl Residency {
         for node in std::mem::take(&mut self.leaving) {
             self.forget(node, NodeState::Absent, &mut changes.left_textures);
             changes.left.push(node);
+        }
+        for texture in std::mem::take(&mut self.orphans) {
+            // Unless another load has come to need it since.
+            let held = &mut self.textures_held[texture as usize];
+            self.ledger.release_texture(&self.sizes, texture, |texture| {
+                *held = false;
+                changes.left_textures.push(texture);
+            });
         }
         let mut bytes = 0;
         let mut taken = 0;
@@ -366,6 +378,16 @@ impl Residency {
     fn end_reading(&mut self, node: u32) {
         self.ledger.release_read(self.to_read[node as usize]);
         self.loading.retain(|&other| other != node);
+    }
+
+    /// Gives back what was reserved for a load that will not be finished.
+    fn forget_load(&mut self, node: u32, state: NodeState) {
+        let (held, orphans) = (&self.textures_held, &mut self.orphans);
+        self.ledger.release_load(&self.sizes, node, held, orphans);
+        self.states[node as usize] = state;
+        if let Some(parent) = self.parents[node as usize] {
+            self.children_held[parent as usize] -= 1;
+        }
     }
 
     /// Gives back what a node held.
@@ -429,7 +451,7 @@ impl Residency {
         }
         for other in abandoned {
             self.end_reading(other);
-            self.forget(other, NodeState::Absent, &mut Vec::new());
+            self.forget_load(other, NodeState::Absent);
             self.counters.abandoned += 1;
         }
         for &other in &victims {
