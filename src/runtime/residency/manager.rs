@@ -249,17 +249,21 @@ impl Residency {
     pub fn next_step(&mut self) -> Option<Step> {
         let mut at = self.list.first_unloaded();
         let mut tried = 0;
+        // What leaves at the next frame has been promised to a node: less important ones that
+        // began now would only be given up for it.
+        let mut promised = false;
         while let Some(node) = at {
             at = self.list.after(node);
             match self.states[node as usize] {
                 NodeState::Absent if self.visited[node as usize] != self.frame => {
                     self.list.remove(node); // no longer of interest to anyone
                 }
-                NodeState::Absent if self.wants(node) => {
+                NodeState::Absent if !promised && self.wants(node) => {
                     if self.make_room(node) {
                         self.begin(node);
                         return Some(self.portion(node));
                     }
+                    promised = !self.leaving.is_empty();
                     tried += 1;
                 }
                 NodeState::Loading { .. } if self.visited[node as usize] == self.frame => {
