@@ -30,4 +30,4 @@ pub use session::Session;
 pub use summary::{Context, SUMMARY_VERSION, summary, summary_text};
 #[cfg(feature = "render")]
 pub use wall::{Snapshots, WallWorld, calibrate, measure_start};
-pub use write::write_run;
+pub use write::{check_output, write_run};

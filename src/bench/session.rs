@@ -111,6 +111,8 @@ impl Session {
         progress: impl FnMut(&FrameRecord) -> bool,
     ) -> Result<(Run, Context)> {
         options.check()?;
+        // Roots that do not fit are told of before anything is loaded.
+        let residency = self.residency(&options)?;
         let weight = constants.unwrap_or_default();
         let tree = self.tree_for(&weight);
         let measured = self.time_roots(renderer, &tree, path)?;
@@ -132,7 +134,6 @@ impl Session {
             adapter: Some(adapter),
             ..self.context(options, path, &policy)
         };
-        let residency = self.residency(&options)?;
         let mut world =
             super::WallWorld::new(&tree, self.files(), renderer, Arc::clone(&residency), snapshots);
         let replay = Replay {

@@ -4,12 +4,35 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
+use tempfile::NamedTempFile;
 
 use super::{Context, FrameRecord, Run, report_html};
 use crate::{Error, Result};
 
+/// Whether results can be written into a folder, before a run that would be in vain. Leaves
+/// nothing behind.
+pub fn check_output(dir: &Path) -> Result<()> {
+    let fails = |what: String| Err(Error::output(dir, what));
+    // The folder itself, or the nearest above it that exists and in which it will be made.
+    let above = dir.ancestors().map(|above| match above.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => above,
+    });
+    let Some(existing) = above.into_iter().find(|above| above.exists()) else {
+        return fails("cannot make the folder: nothing above it exists".into());
+    };
+    if !existing.is_dir() {
+        return fails(format!("expected a folder; {} is a file", existing.display()));
+    }
+    match NamedTempFile::new_in(existing) {
+        Ok(_) => Ok(()),
+        Err(error) => fails(format!("cannot write into {}: {error}", existing.display())),
+    }
+}
+
 /// Writes `frames.csv`, `summary.json` and `report.html` into a folder, which is made where it is
-/// missing; each beside and renamed. The paths of the files.
+/// missing. An earlier result stays whole until all of the new one is written beside it. The paths of the
+/// files.
 pub fn write_run(
     dir: &Path,
     run: &Run,
@@ -18,15 +41,16 @@ pub fn write_run(
 ) -> Result<Vec<PathBuf>> {
     std::fs::create_dir_all(dir)
         .map_err(|error| Error::output(dir, format!("cannot make the folder: {error}")))?;
-    let frames = dir.join("frames.csv");
-    write_beside(&frames, &frames_csv(run, context.levels)?)?;
-    let json = dir.join("summary.json");
     let text = serde_json::to_string_pretty(summary)
         .map_err(|error| Error::Internal(format!("a summary that has no JSON form: {error}")))?;
-    write_beside(&json, (text + "\n").as_bytes())?;
-    let report = dir.join("report.html");
-    write_beside(&report, report_html(run, context, summary)?.as_bytes())?;
-    Ok(vec![frames, json, report])
+    let files = [
+        ("frames.csv", frames_csv(run, context.levels)?),
+        ("summary.json", (text + "\n").into_bytes()),
+        ("report.html", report_html(run, context, summary)?.into_bytes()),
+    ]
+    .map(|(name, bytes)| (dir.join(name), bytes));
+    write_together(&files)?;
+    Ok(files.map(|(path, _)| path).into())
 }
 
 /// The frames as CSV.
@@ -42,11 +66,31 @@ pub(super) fn frames_csv(run: &Run, levels: usize) -> Result<Vec<u8>> {
 
 /// Writes a file beside its place and renames it there, so that it is whole or as it was.
 pub(crate) fn write_beside(path: &Path, bytes: &[u8]) -> Result<()> {
+    place(path, stage(path, bytes)?)
+}
+
+/// Writes files beside their places, and only once all of them are whole renames them there.
+fn write_together(files: &[(PathBuf, Vec<u8>)]) -> Result<()> {
+    let mut staged = Vec::with_capacity(files.len());
+    for (path, bytes) in files {
+        if path.is_dir() {
+            return Err(Error::output(path, "cannot write: a folder is in its place"));
+        }
+        staged.push(stage(path, bytes)?);
+    }
+    files.iter().zip(staged).try_for_each(|((path, _), file)| place(path, file))
+}
+
+fn failed(path: &Path) -> impl Fn(std::io::Error) -> Error {
+    move |error| Error::output(path, format!("cannot write: {error}"))
+}
+
+/// A file beside the place where it belongs; gone again where it is not placed there.
+fn stage(path: &Path, bytes: &[u8]) -> Result<NamedTempFile> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let failed = |error: std::io::Error| Error::output(path, format!("cannot write: {error}"));
-    let mut file =
-        tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new("."))).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
+    let failed = failed(path);
+    let mut file = NamedTempFile::new_in(folder.unwrap_or(Path::new("."))).map_err(&failed)?;
+    file.write_all(bytes).map_err(&failed)?;
     // Temporary files are for their owner only; what is written for a person is as umask has it.
     #[cfg(unix)]
     {
@@ -54,6 +98,10 @@ pub(crate) fn write_beside(path: &Path, bytes: &[u8]) -> Result<()> {
         let mode = std::fs::Permissions::from_mode(0o644);
         file.as_file().set_permissions(mode).map_err(failed)?;
     }
-    file.persist(path).map_err(|error| failed(error.error))?;
+    Ok(file)
+}
+
+fn place(path: &Path, file: NamedTempFile) -> Result<()> {
+    file.persist(path).map_err(|error| failed(path)(error.error))?;
     Ok(())
 }

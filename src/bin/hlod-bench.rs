@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use hlod::bench::{
     BenchOptions, ClockConstants, Context, FrameRecord, Limits, Pace, Run, Session, Size,
-    SummaryFile, compare, summary, summary_text, write_run,
+    SummaryFile, check_output, compare, summary, summary_text, write_run,
 };
 use hlod::camera::{self, CameraPath, DEFAULT_FPS, Ground, PathKind};
 use hlod::runtime::lakhia::{LakhiaOptions, ShareFeedback, StartOfHysteresis};
@@ -23,6 +23,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 #[derive(Parser, Debug)]
 #[command(
     version,
+    allow_negative_numbers = true,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
     override_usage = "hlod-bench [OPTIONS] OUT PATH.csv\n       hlod-bench make-path [OPTIONS] OUT --kind KIND --out PATH.csv\n       hlod-bench calibrate [OPTIONS] OUT --out CLOCK.json\n       hlod-bench compare [OPTIONS] BASE.json NEW.json",
@@ -181,8 +182,8 @@ struct RunArgs {
     /// Which graphics adapter: part of its name, or its number
     #[arg(long, value_name = "NAME", help_heading = "Drawing")]
     adapter: Option<String>,
-    /// Write every Nth frame as PNG into OUT/snapshots
-    #[arg(long, value_name = "N", help_heading = "Drawing")]
+    /// Write every Nth frame as PNG into DIR/snapshots, N 1 or more
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Drawing")]
     snapshots: Option<u64>,
     /// Tint nodes by level
     #[arg(long, help_heading = "Drawing")]
@@ -333,6 +334,7 @@ fn replay(arguments: &RunArgs) -> Result<()> {
     let constants = arguments.constants.as_deref().map(ClockConstants::read).transpose()?;
     let options = arguments.options(&session);
     options.check()?;
+    check_output(&arguments.out)?;
     let bar = Bar::new(arguments.quiet, path.frames.len());
     let (run, mut context) = match arguments.clock {
         Clock::Model => {
@@ -354,9 +356,11 @@ fn replay(arguments: &RunArgs) -> Result<()> {
         [first, ..] => Err(Error::input(
             dir,
             format!(
-                "the run went on without {} files that cannot be used; build again. The first: \
-                 {first}",
-                context.broken.len()
+                "the run went on without {} that cannot be used; build again. The first: {first}",
+                match context.broken.len() {
+                    1 => "1 file".to_owned(),
+                    count => format!("{count} files"),
+                }
             ),
         )),
     }

@@ -22,15 +22,17 @@ fn left_of_x(up: UpAxis) -> DVec3 {
 /// `yaw` turns counter-clockwise as seen from the sky, 0 being along +x; `pitch` raises the view
 /// above the horizon; `roll` turns the camera clockwise about its line of sight.
 pub fn from_angles(up: UpAxis, yaw_deg: f64, pitch_deg: f64, roll_deg: f64) -> DQuat {
-    let (yaw_sin, yaw_cos) = yaw_deg.to_radians().sin_cos();
-    let (pitch_sin, pitch_cos) = pitch_deg.to_radians().sin_cos();
+    // The same on every machine, unlike the system's.
+    let (yaw_sin, yaw_cos) = libm::sincos(yaw_deg.to_radians());
+    let (pitch_sin, pitch_cos) = libm::sincos(pitch_deg.to_radians());
     let sky = up_vector(up);
     let level = DVec3::X * yaw_cos + left_of_x(up) * yaw_sin;
     let forward = level * pitch_cos + sky * pitch_sin;
     // Unlike a cross product of the line of sight and the sky, this holds at the zenith too.
     let right = DVec3::X * yaw_sin - left_of_x(up) * yaw_cos;
     let upright = DQuat::from_mat3(&DMat3::from_cols(right, right.cross(forward), -forward));
-    (upright * DQuat::from_rotation_z(-roll_deg.to_radians())).normalize()
+    let (sin, cos) = libm::sincos(-roll_deg.to_radians() / 2.0);
+    (upright * DQuat::from_xyzw(0.0, 0.0, sin, cos)).normalize()
 }
 
 /// The rotation of an upright camera at `eye` that looks at `target`; `None` where the two
@@ -39,8 +41,8 @@ pub fn looking_at(up: UpAxis, eye: DVec3, target: DVec3) -> Option<DQuat> {
     let forward = (target - eye).try_normalize()?;
     let sky = up_vector(up);
     let height = forward.dot(sky).clamp(-1.0, 1.0);
-    let yaw = forward.dot(left_of_x(up)).atan2(forward.x);
-    Some(from_angles(up, yaw.to_degrees(), height.asin().to_degrees(), 0.0))
+    let yaw = libm::atan2(forward.dot(left_of_x(up)), forward.x);
+    Some(from_angles(up, yaw.to_degrees(), libm::asin(height).to_degrees(), 0.0))
 }
 
 #[cfg(test)]

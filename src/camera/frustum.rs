@@ -19,7 +19,8 @@ pub struct Frustum {
 impl Frustum {
     /// The pyramid of a camera whose picture is `aspect` times as wide as high.
     pub fn new(pose: &Pose, aspect: f64) -> Self {
-        let half_height = (pose.fov_y_deg.to_radians() / 2.0).tan();
+        // The same on every machine, unlike the system's.
+        let half_height = libm::tan(pose.fov_y_deg.to_radians() / 2.0);
         let half_width = half_height * aspect;
         let (right, up, forward) = (pose.right(), pose.up(), pose.forward());
         let side = |axis: DVec3, half: f64| (forward * half + axis).normalize();

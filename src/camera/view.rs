@@ -26,6 +26,6 @@ impl View {
 
     /// Pixels that one metre takes at one metre's distance, in the middle of the picture.
     pub fn pixels_per_metre(&self) -> f64 {
-        f64::from(self.size[1]) / (2.0 * (self.pose.fov_y_deg.to_radians() / 2.0).tan())
+        f64::from(self.size[1]) / (2.0 * libm::tan(self.pose.fov_y_deg.to_radians() / 2.0))
     }
 }

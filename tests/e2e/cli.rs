@@ -4,7 +4,6 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command as Process, Stdio};
 
-use assert_cmd::Command;
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::{contains, is_empty};
 use tempfile::TempDir;
@@ -394,17 +393,4 @@ fn a_reader_that_stops_reading_is_no_failure() {
     let done = child.wait_with_output().unwrap();
     assert_eq!(done.status.code(), Some(SUCCESS), "{}", String::from_utf8_lossy(&done.stderr));
     assert!(done.stderr.is_empty());
-}
-
-#[test]
-fn hlod_bench_says_that_it_is_not_there_yet() {
-    for arguments in [&[][..], &["out", "path.csv"]] {
-        Command::cargo_bin("hlod-bench")
-            .unwrap()
-            .args(arguments)
-            .assert()
-            .code(1)
-            .stdout(is_empty())
-            .stderr(contains("not part of this version").and(contains("panicked").not()));
-    }
 }

@@ -70,7 +70,7 @@ impl<'a> WallWorld<'a> {
                 Ok(arrival) => {
                     self.arrived.insert(arrival.node, arrival);
                 }
-                Err(error) => self.broken.push(error.to_string()),
+                Err(error) => report(&mut self.broken, &error),
             }
         }
     }
@@ -81,6 +81,14 @@ impl<'a> WallWorld<'a> {
         }
         let level = self.tree.node(arrival.node).level;
         self.renderer.upload(arrival.node, level, &arrival.content)
+    }
+}
+
+/// Adds a file that cannot be used; a picture that several nodes share is named once.
+fn report(broken: &mut Vec<String>, error: &Error) {
+    let what = error.to_string();
+    if !broken.contains(&what) {
+        broken.push(what);
     }
 }
 
@@ -101,7 +109,7 @@ impl World for WallWorld<'_> {
                     residency.loaded(root);
                 }
                 Err(error) => {
-                    self.broken.push(error.to_string());
+                    report(&mut self.broken, &error);
                     residency.broken(root);
                 }
             }

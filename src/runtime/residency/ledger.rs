@@ -51,17 +51,41 @@ impl Ledger {
         self.used -= read_bytes;
     }
 
+    /// Gives back what a load that is given up would have held. Shared pictures that are in memory
+    /// and that nobody else needs stay counted, and are put into `orphans`.
+    pub fn release_load(
+        &mut self,
+        sizes: &Sizes,
+        node: u32,
+        in_memory: &[bool],
+        orphans: &mut Vec<u32>,
+    ) {
+        let size = &sizes.nodes[node as usize];
+        self.used -= size.held_bytes;
+        for &texture in &size.textures {
+            match self.users[texture as usize] == 1 && in_memory[texture as usize] {
+                true => orphans.push(texture),
+                false => self.release_texture(sizes, texture, |_| {}),
+            }
+        }
+    }
+
+    /// One node less needs a shared picture; calls `gone` where it was the last.
+    pub fn release_texture(&mut self, sizes: &Sizes, texture: u32, gone: impl FnOnce(u32)) {
+        let users = &mut self.users[texture as usize];
+        *users -= 1;
+        if *users == 0 {
+            self.used -= sizes.textures[texture as usize].held_bytes;
+            gone(texture);
+        }
+    }
+
     /// Gives back what a node held; calls `gone` with shared pictures that nobody needs any more.
     pub fn release(&mut self, sizes: &Sizes, node: u32, mut gone: impl FnMut(u32)) {
         let size = &sizes.nodes[node as usize];
         self.used -= size.held_bytes;
         for &texture in &size.textures {
-            let users = &mut self.users[texture as usize];
-            *users -= 1;
-            if *users == 0 {
-                self.used -= sizes.textures[texture as usize].held_bytes;
-                gone(texture);
-            }
+            self.release_texture(sizes, texture, &mut gone);
         }
     }
 }

@@ -92,6 +92,9 @@ pub struct Residency {
     arrivals: Vec<u32>,
     /// Leaving.
     leaving: Vec<u32>,
+    /// Shared pictures in memory that only a load needed that was given up; drawing lets go of
+    /// them, and their memory is free, at the next frame.
+    orphans: Vec<u32>,
     /// Being read or suspended.
     loading: Vec<u32>,
     /// The load that was given the last portion.
@@ -119,6 +122,7 @@ impl Residency {
             frame: 0,
             arrivals: Vec::new(),
             leaving: Vec::new(),
+            orphans: Vec::new(),
             loading: Vec::new(),
             current: None,
             resident: 0,
@@ -245,17 +249,21 @@ impl Residency {
     pub fn next_step(&mut self) -> Option<Step> {
         let mut at = self.list.first_unloaded();
         let mut tried = 0;
+        // What leaves at the next frame has been promised to a node: less important ones that
+        // began now would only be given up for it.
+        let mut promised = false;
         while let Some(node) = at {
             at = self.list.after(node);
             match self.states[node as usize] {
                 NodeState::Absent if self.visited[node as usize] != self.frame => {
                     self.list.remove(node); // no longer of interest to anyone
                 }
-                NodeState::Absent if self.wants(node) => {
+                NodeState::Absent if !promised && self.wants(node) => {
                     if self.make_room(node) {
                         self.begin(node);
                         return Some(self.portion(node));
                     }
+                    promised = !self.leaving.is_empty();
                     tried += 1;
                 }
                 NodeState::Loading { .. } if self.visited[node as usize] == self.frame => {
@@ -322,7 +330,7 @@ impl Residency {
             return;
         }
         self.end_reading(node);
-        self.forget(node, NodeState::Broken, &mut Vec::new());
+        self.forget_load(node, NodeState::Broken);
         self.list.set_loaded(node, true);
         self.list.remove(node);
     }
@@ -334,6 +342,14 @@ impl Residency {
         for node in std::mem::take(&mut self.leaving) {
             self.forget(node, NodeState::Absent, &mut changes.left_textures);
             changes.left.push(node);
+        }
+        for texture in std::mem::take(&mut self.orphans) {
+            // Unless another load has come to need it since.
+            let held = &mut self.textures_held[texture as usize];
+            self.ledger.release_texture(&self.sizes, texture, |texture| {
+                *held = false;
+                changes.left_textures.push(texture);
+            });
         }
         let mut bytes = 0;
         let mut taken = 0;
@@ -366,6 +382,16 @@ impl Residency {
     fn end_reading(&mut self, node: u32) {
         self.ledger.release_read(self.to_read[node as usize]);
         self.loading.retain(|&other| other != node);
+    }
+
+    /// Gives back what was reserved for a load that will not be finished.
+    fn forget_load(&mut self, node: u32, state: NodeState) {
+        let (held, orphans) = (&self.textures_held, &mut self.orphans);
+        self.ledger.release_load(&self.sizes, node, held, orphans);
+        self.states[node as usize] = state;
+        if let Some(parent) = self.parents[node as usize] {
+            self.children_held[parent as usize] -= 1;
+        }
     }
 
     /// Gives back what a node held.
@@ -429,7 +455,7 @@ impl Residency {
         }
         for other in abandoned {
             self.end_reading(other);
-            self.forget(other, NodeState::Absent, &mut Vec::new());
+            self.forget_load(other, NodeState::Absent);
             self.counters.abandoned += 1;
         }
         for &other in &victims {

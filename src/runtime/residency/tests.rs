@@ -41,7 +41,9 @@ fn started(tree: &SceneTree, sizes: Sizes, options: ResidencyOptions) -> Residen
 fn check(residency: &Residency, tree: &SceneTree, sizes: &Sizes, cap: u64) {
     assert!(residency.used_bytes() <= cap && residency.peak_bytes() <= cap);
     let mut used = 0;
-    let mut textures = vec![false; sizes.textures.len()];
+    // What is in memory counts until drawing was told to let go of it.
+    let in_memory = (0..sizes.textures.len() as u32).map(|texture| residency.has_texture(texture));
+    let mut textures: Vec<bool> = in_memory.collect();
     for node in 0..tree.len() as u32 {
         let state = residency.state(node);
         let held = !matches!(state, NodeState::Absent | NodeState::Broken);
@@ -331,4 +333,37 @@ fn promises_hold_whatever_happens() {
             }
         }
     }
+}
+
+/// A load that is given up may be the last to need a shared picture that drawing holds still.
+#[test]
+fn pictures_that_only_a_load_kept_are_let_go_of_when_it_is_given_up() {
+    const PICTURE: u64 = 4000;
+    let tree = tree(vec![sketch([0.0; 3], 1.0, vec![leaf(), leaf(), leaf()])]);
+    let mut sizes = sizes(4);
+    sizes.textures = vec![TextureSize { file_bytes: 100, held_bytes: PICTURE }];
+    sizes.nodes[1].textures = vec![0];
+    sizes.nodes[2].textures = vec![0];
+    let cap = 2 * HELD + PICTURE + (HELD + FILE) + 1000;
+    let mut residency = started(&tree, sizes.clone(), options(cap));
+    residency.set_priorities(&[(0, 9.0), (1, 1.0)], &[]);
+    assert_eq!(load_all(&mut residency), [1]);
+    residency.begin_frame();
+    // Another child begins to load and relies on the picture.
+    residency.set_priorities(&[(0, 9.0), (2, 7.9)], &[(1, 0.1)]);
+    assert_eq!(residency.next_step().map(|step| step.node), Some(2));
+    assert_eq!(residency.files_of_load(2), FILE);
+    // The child that brought it makes room for a third.
+    residency.set_priorities(&[(0, 9.0), (2, 7.9), (3, 8.0)], &[(1, 0.1)]);
+    assert_eq!(residency.next_step().map(|step| step.node), Some(2));
+    assert_eq!(residency.state(1), NodeState::Leaving);
+    let changes = residency.begin_frame();
+    assert_eq!((changes.left, changes.left_textures), (vec![1], vec![]));
+    let before = residency.used_bytes();
+    residency.broken(2);
+    assert_eq!(residency.used_bytes(), before - HELD - FILE, "drawing holds the picture still");
+    assert!(residency.has_texture(0));
+    assert_eq!(residency.begin_frame().left_textures, [0]);
+    assert!(!residency.has_texture(0));
+    check(&residency, &tree, &sizes, cap);
 }

@@ -1,0 +1,73 @@
+//! The model clock gives the log that is written down in `fixtures/bench/`, byte for byte.
+//!
+//! `scene.hlod` is the scene of the fixture city, which is all that the model clock reads, and
+//! `path.csv` a flight over it. After a change of selection, loading or the log that is meant,
+//! `HLOD_BLESS=1 cargo test --release --test bench golden` writes the log down anew, and the scene
+//! too, which a new version of its format needs; the path stays.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use hlod::format::SCENE_FILE;
+
+use crate::bench_support::{Frames, build_options, hlod_bench};
+use crate::support::build_with;
+
+fn fixtures() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures")
+}
+
+fn bless() -> bool {
+    std::env::var_os("HLOD_BLESS").is_some_and(|bless| bless == "1")
+}
+
+/// Writes the scene down anew: that of the fixture city as it is built now.
+fn write_scene(to: &Path) {
+    let folder = tempfile::tempdir().unwrap();
+    let city = fixtures().join("tiny_city/city.obj");
+    build_with(&[city], folder.path(), &build_options(60));
+    fs::create_dir_all(to).unwrap();
+    fs::copy(folder.path().join(SCENE_FILE), to.join(SCENE_FILE)).unwrap();
+}
+
+#[test]
+fn a_flight_by_the_model_clock_gives_the_golden_log() {
+    let kept = fixtures().join("bench");
+    if bless() {
+        write_scene(&kept);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    // A target and a cap that both bind, and loading slow enough to be waited for.
+    hlod_bench()
+        .current_dir(folder.path())
+        .arg(&kept)
+        .arg(kept.join("path.csv"))
+        .arg("--constants")
+        .arg(kept.join("clock.json"))
+        .args(["--clock", "model", "--target-ms", "4", "--max-memory", "250KiB"])
+        .args(["--portion", "4KiB", "--out", "r", "-q"])
+        .assert()
+        .success();
+    let found = fs::read(folder.path().join("r/frames.csv")).unwrap();
+    let frames = Frames::parse(&found);
+    // What makes it worth keeping: something happens in it.
+    assert!(frames.column("toggles_up").iter().sum::<f64>() > 3.0);
+    assert!(frames.column("toggles_down").iter().sum::<f64>() > 3.0);
+    assert!(frames.column("evictions").iter().sum::<f64>() > 0.0);
+    assert!(frames.max("culled") > 0.0 && frames.max("waiting") > 0.0);
+    assert!(frames.max("memory_bytes") <= 250.0 * 1024.0);
+    assert!(found.len() < 100_000, "{} bytes", found.len());
+    let path = kept.join("frames.csv");
+    if bless() {
+        fs::write(&path, &found).unwrap();
+    }
+    let expected = fs::read_to_string(&path)
+        .unwrap_or_else(|error| panic!("{}: {error}; HLOD_BLESS=1 writes it", path.display()));
+    let found = String::from_utf8(found).unwrap();
+    let differing = expected.lines().zip(found.lines()).find(|(expected, found)| expected != found);
+    assert!(
+        expected == found,
+        "{} differs, first in (expected, found)\n{differing:#?}\nHLOD_BLESS=1 accepts it",
+        path.display()
+    );
+}

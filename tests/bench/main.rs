@@ -1,0 +1,20 @@
+//! `hlod-bench` and what it rests on: scenes built from fixtures, replayed as a user would.
+//!
+//! One test program with a module for each promise, so that the library is linked once. What
+//! draws says that it was skipped where there is no graphics adapter, or fails if
+//! `HLOD_REQUIRE_GPU` is 1.
+
+#[allow(dead_code)]
+#[path = "../e2e/support/mod.rs"]
+mod support;
+
+mod bench_support;
+
+mod cli;
+mod damage;
+mod golden;
+mod model_clock;
+mod output;
+mod stress;
+#[cfg(feature = "render")]
+mod wall;

@@ -1,0 +1,169 @@
+//! The model clock: the same bytes always, and no more work than what is drawn asks for.
+
+use std::sync::{Arc, Mutex};
+
+use glam::DVec3;
+use hlod::bench::{BenchOptions, ClockConstants, FrameRecord, ModelWorld, Replay, run};
+use hlod::camera::{CameraPath, PathFrame, Pose, from_angles};
+use hlod::format::{BlockInfo, Node, Scene};
+use hlod::mesh::UpAxis;
+use hlod::runtime::SceneTree;
+use hlod::runtime::lakhia::Lakhia;
+use hlod::runtime::residency::{Residency, Sizes};
+
+use crate::bench_support::{Place, city, hlod_bench};
+use crate::support::result::contents;
+
+#[test]
+fn the_same_bytes_on_any_number_of_threads_and_from_any_folder() {
+    let place = Place::new(city());
+    let elsewhere = tempfile::tempdir().unwrap();
+    let mut results = Vec::new();
+    for (number, threads) in ["1", "2", "7", "7"].iter().enumerate() {
+        let result = place.path().join(format!("r{number}"));
+        let from = if number % 2 == 0 { place.path() } else { elsewhere.path() };
+        hlod_bench()
+            .current_dir(from)
+            .env("RAYON_NUM_THREADS", threads)
+            .args([place.out(), place.path().join("fly.csv")])
+            .args(["--clock", "model", "--target-ms", "5", "--max-memory", "3MiB", "-q", "--out"])
+            .arg(&result)
+            .assert()
+            .success();
+        results.push(contents(&result));
+    }
+    assert!(results[0]["frames.csv"].len() > 1_000);
+    for other in &results[1..] {
+        for file in ["frames.csv", "summary.json"] {
+            assert!(results[0][file] == other[file], "{file} differs");
+        }
+    }
+}
+
+/// Houses in two rows, each a tree of four children a node.
+fn street(houses: usize, depth: u32) -> Scene {
+    let mut nodes = Vec::new();
+    for house in 0..houses {
+        let side = if house % 2 == 0 { 15.0 } else { -15.0 };
+        add(&mut nodes, [house as f64 * 8.0, side, 0.0], 12.0, None, 0, depth);
+    }
+    Scene {
+        parameters: serde_json::json!({}),
+        fingerprint: [7; 32],
+        up: UpAxis::Z,
+        blocks: vec![BlockInfo { name: "b".into(), input: "b.obj".into(), origin: [0.0; 3] }],
+        shared_textures: Vec::new(),
+        nodes,
+    }
+}
+
+fn add(
+    nodes: &mut Vec<Node>,
+    at: [f64; 3],
+    size: f64,
+    parent: Option<u32>,
+    level: u32,
+    depth: u32,
+) -> u32 {
+    let index = nodes.len() as u32;
+    let corner = |sign: f64| at.map(|centre| centre + sign * size / 2.0);
+    nodes.push(Node {
+        // The same for a node whatever stands below it.
+        id: u64::from(index),
+        parent,
+        first_child: None,
+        next_sibling: None,
+        level,
+        block: Some(0),
+        triangles: 100,
+        textured_triangles: 0,
+        vertices: 100,
+        bbox_min: corner(-1.0),
+        bbox_max: corner(1.0),
+        cost: 100.0,
+        static_benefit: size,
+        average_normal: [0.0; 3],
+        geometric_error: 0.0,
+        texels: 0,
+        pictures: Vec::new(),
+        shared_texels: 0,
+        origin: [0.0; 3],
+        file: format!("n{index}.glb"),
+        file_bytes: 1000,
+        file_crc: 0,
+        shared_textures: Vec::new(),
+    });
+    let mut before: Option<u32> = None;
+    for quarter in 0..if depth == 0 { 0 } else { 4 } {
+        let [east, up] = [quarter % 2, quarter / 2].map(|part| f64::from(part) * 2.0 - 1.0);
+        let at = [at[0] + east * size / 4.0, at[1], at[2] + up * size / 4.0];
+        let child = add(nodes, at, size / 2.0, Some(index), level + 1, depth - 1);
+        match before {
+            None => nodes[index as usize].first_child = Some(child),
+            Some(before) => nodes[before as usize].next_sibling = Some(child),
+        }
+        before = Some(child);
+    }
+    index
+}
+
+fn replay(scene: &Scene, frames: usize, target_ms: f64) -> Vec<FrameRecord> {
+    assert_eq!(scene.check(), []);
+    let frame = |frame: usize| PathFrame {
+        frame: frame as u64,
+        time_s: frame as f64 / 30.0,
+        pose: Pose {
+            position: DVec3::new(frame as f64 * 0.2, 0.0, 0.0),
+            rotation: from_angles(UpAxis::Z, 20.0, 0.0, 0.0),
+            fov_y_deg: 60.0,
+        },
+    };
+    let path = CameraPath { frames: (0..frames).map(frame).collect() };
+    let tree = SceneTree::new(scene);
+    let constants = ClockConstants {
+        fixed_ms: 0.5,
+        ms_per_cost: 0.001,
+        ms_per_node: 0.0,
+        ..ClockConstants::default()
+    };
+    let mut options = BenchOptions::default();
+    options.selection.target_ms = target_ms;
+    options.selection.share_limit = 1.0;
+    options.selection.time = constants.time_model();
+    let sizes = Sizes::new(scene, |vertices, _, _| u64::from(vertices) * 24, |_| 0);
+    let residency = Residency::new(&tree, sizes, options.residency).unwrap();
+    let mut policy = Lakhia::new(options.selection);
+    let mut world = ModelWorld::new(&tree, constants);
+    let replay = Replay {
+        tree: &tree,
+        path: &path,
+        policy: &mut policy,
+        residency: Arc::new(Mutex::new(residency)),
+        world: &mut world,
+        options,
+        levels: scene.level_count(),
+    };
+    run(replay, |_| true).unwrap().frames
+}
+
+/// What a frame does is counted, not timed: nodes that nobody draws cost nothing.
+#[test]
+fn work_does_not_grow_with_what_stands_below_the_front() {
+    let (shallow, deep) = (street(12, 4), street(12, 6));
+    assert!((3_000..5_000).contains(&shallow.nodes.len()));
+    assert!(deep.nodes.len() > 15 * shallow.nodes.len());
+    let [shallow, deep] = [shallow, deep].map(|scene| replay(&scene, 300, 6.0));
+    assert_eq!(shallow.len(), 300);
+    for (one, other) in shallow.iter().zip(&deep) {
+        // The front stays above where the two differ, and nodes below it are met only once.
+        assert_eq!(one.nodes_by_level[4], 0);
+        assert_eq!(other.nodes_by_level[..5], one.nodes_by_level);
+        assert_eq!((one.visited, one.culled), (other.visited, other.culled));
+        assert_eq!((one.waiting, one.read_bytes), (other.waiting, other.read_bytes));
+        assert_eq!(one.estimated_ms.to_bits(), other.estimated_ms.to_bits());
+        assert!(one.visited <= 12 + 4 * 4 * one.nodes.max(4), "{one:?}");
+    }
+    let levels: Vec<u32> =
+        (0..5).map(|level| shallow.iter().map(|frame| frame.nodes_by_level[level]).sum()).collect();
+    assert!(levels[1] > 0 && levels[2] > 0, "{levels:?}: the front is of some depth");
+}
