@@ -73,7 +73,7 @@ enum Command {
         #[arg(long)]
         json: bool,
         #[command(flatten)]
-        limits: Limits,
+        limits: Box<Limits>,
     },
     /// Measures the constants of the model clock on this machine
     Calibrate {
