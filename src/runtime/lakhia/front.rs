@@ -95,37 +95,34 @@ impl Lakhia {
         }
         let Counted { allowed, needed_ms, rising, falling } =
             self.update_counters(tree, members, siblings, sum);
-        let resident = || {
-            members.iter().zip(&self.seen).all(|(&node, seen)| {
-                residents.contains(node) || !(seen.visible || self.options.all_siblings)
-            })
-        };
         if let Some(parent) = siblings.parent {
-            let resident = resident();
-            if !(allowed && resident) {
-                if resident {
-                    let more_ms = needed_ms - self.feedback.v_time * tree.node(parent).cost;
-                    self.outlook.refused(more_ms, rising);
-                }
-                self.draw(tree, parent, out);
-                return;
+            let resident = members.iter().zip(&self.seen).all(|(&node, seen)| {
+                residents.contains(node) || !(seen.visible || self.options.all_siblings)
+            });
+            let more_ms = needed_ms - self.time_needed(tree, parent);
+            match (resident, allowed) {
+                (true, true) => self.outlook.accepted(more_ms, falling),
+                (true, false) => self.outlook.refused(more_ms, rising),
+                (false, _) => {}
             }
-            let more_ms = needed_ms - self.feedback.v_time * tree.node(parent).cost;
-            self.outlook.accepted(more_ms, falling);
+            if !(resident && allowed) {
+                return self.draw(tree, parent, out);
+            }
         }
         // Roots have no parent that could stand for them: far ones that need more than their
         // share do not keep the near ones from going on.
         let visible_count = self.seen.iter().filter(|seen| seen.visible).count();
-        for (&node, seen) in members.iter().zip(&self.seen) {
-            if !seen.visible || !(siblings.parent.is_some() || residents.contains(node)) {
+        for (index, &node) in members.iter().enumerate() {
+            let Seen { visible, priority } = self.seen[index];
+            // A root whose file is broken is not there; others come this far only when they are.
+            if !visible || !(siblings.parent.is_some() || residents.contains(node)) {
                 continue;
             }
-            if !tree.children(node).is_empty() {
-                let share_ms = siblings.share_ms * share(seen.priority, sum, visible_count);
-                self.queue.push_back(Siblings { parent: Some(node), share_ms });
+            if tree.children(node).is_empty() {
+                self.draw(tree, node, out);
             } else {
-                self.cost += tree.node(node).cost;
-                out.front.push(node);
+                let share_ms = siblings.share_ms * share(priority, sum, visible_count);
+                self.queue.push_back(Siblings { parent: Some(node), share_ms });
             }
         }
     }
@@ -140,7 +137,7 @@ impl Lakhia {
     ) -> Counted {
         let share_ms = siblings.share_ms;
         let visible = || members.iter().zip(&self.seen).filter(|(_, seen)| seen.visible);
-        let time_needed = |node: u32| self.feedback.v_time * tree.node(node).cost;
+        let time_needed = |node: u32| self.time_needed(tree, node);
         let count = visible().count();
         let needed_ms = visible().map(|(&node, _)| time_needed(node)).sum::<f64>();
         if visible().any(|(&node, _)| self.hysteresis.is_new(node)) {
@@ -158,7 +155,7 @@ impl Lakhia {
         let (mut cumulative, mut coming, mut going) = (0.0, 0.0, 0.0);
         for (&node, seen) in members.iter().zip(&self.seen).filter(|(_, seen)| seen.visible) {
             let time_slice = share_ms * share(seen.priority, sum, count);
-            let time_needed = self.feedback.v_time * tree.node(node).cost;
+            let time_needed = self.time_needed(tree, node);
             self.hysteresis.update(node, time_slice, time_needed, self.options.hyst_limit);
             cumulative += self.hysteresis.truncated(node, 0.0, &self.options);
             let urgency = time_slice / time_needed - 1.0;
@@ -171,6 +168,11 @@ impl Lakhia {
             rising: coming >= 0.0,
             falling: going < 0.0,
         }
+    }
+
+    /// `timeNeeded = v_time × cost`, milliseconds.
+    fn time_needed(&self, tree: &SceneTree, node: u32) -> f64 {
+        self.feedback.v_time * tree.node(node).cost
     }
 
     fn draw(&mut self, tree: &SceneTree, node: u32, out: &mut Selection) {
