@@ -152,7 +152,7 @@ fn over_budget(node: &NodeDraft, triangles: usize) -> Option<String> {
     {
         return None;
     }
-    let skirts = node.skirts.len() * skirt::TRIANGLES_PER_SKIRT;
+    let skirts = skirt::triangles_of(node.skirts);
     Some(if triangles - skirts <= node.budget {
         format!("its long border needs {skirts} triangles of skirts")
     } else {

@@ -16,9 +16,9 @@ use super::lattice::Lattice;
 use super::merge::merge;
 use super::remnant::remnant;
 use super::simplify::{AppearanceWeights, LadderStep, Simplified, Simplifier, simplify};
-use super::skirt::{Skirt, TRIANGLES_PER_SKIRT, skirts};
+use super::skirt::{Skirt, skirts, triangles_of};
 use super::stages::{Stage, Stages};
-use super::thin_border::thin_border;
+use super::thin_border::{border_edges, edge_key, edges_among, thin_border};
 use crate::Result;
 use crate::mesh::Mesh;
 
@@ -337,21 +337,19 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             let mut mesh = source_mesh.clone();
             thin_border(&mut mesh, &mut border, path, at);
             // Skirts count towards the budget, but may not take more than half of it.
-            let skirt_triangles = match with_skirts {
-                true => skirts(&mesh, &border, path, at, step).len() * TRIANGLES_PER_SKIRT,
-                false => 0,
-            };
+            let edges = if with_skirts { border_edges(&mesh, &border, path) } else { Vec::new() };
+            let skirt_triangles = triangles_of(&skirts(&mesh, &border, &edges, path, at, step));
             let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
             let HierarchyOptions { simplifier, weights, .. } = *self.options;
             let mut result = simplify(&mesh, &border, path, at, target, simplifier, weights);
             if result.mesh.triangles.is_empty() {
                 result = remnant(&source_mesh, &border, LEAST_TRIANGLES.min(target));
             }
-            // Simplification renumbers vertices, and clustering may take a border edge away.
-            let skirts = match with_skirts {
-                true => skirts(&result.mesh, &result.border, path, at, step),
-                false => Vec::new(),
-            };
+            // Simplification renumbers vertices, and may fold the mesh over an edge of the border
+            // so that it looks like an inner one; the border is there all the same.
+            let edges = edges.into_iter().map(|ends| edge_key(&mesh, ends)).collect();
+            let edges = edges_among(&edges, &result.mesh, &result.border, path);
+            let skirts = skirts(&result.mesh, &result.border, &edges, path, at, step);
             (result, skirts)
         });
         let Simplified { mesh, border, step, .. } = simplified;

@@ -4,31 +4,62 @@
 //! stay those of a vertex of the same chart. Both sides of a plane do the same, since which
 //! vertices go was decided by the plane ([`super::chain`]).
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::border::{Border, Fate, Path};
 use crate::mesh::{Mesh, PositionKey, key, wide};
 
-/// The open edges of a mesh whose ends share a plane of `path`: each once, as the triangle that
-/// has it winds.
+/// An edge by the positions of its ends, in key order.
+pub type EdgeKey = [PositionKey<f32>; 2];
+
+/// The [`EdgeKey`] of two vertices.
+pub fn edge_key(mesh: &Mesh, ends: [u32; 2]) -> EdgeKey {
+    let [a, b] = ends.map(|vertex| key(mesh.positions[vertex as usize]));
+    if a <= b { [a, b] } else { [b, a] }
+}
+
+/// The open edges of a mesh whose ends share a plane of `path`: each once, as the first triangle
+/// that has it winds. A mesh that is folded over such an edge has it three times, and ends there
+/// all the same; one that has it twice goes on from there.
 pub fn border_edges(mesh: &Mesh, border: &Border, path: &Path) -> Vec<[u32; 2]> {
+    edges_along(mesh, border, path, |_, uses| uses % 2 == 1)
+}
+
+/// Those of `edges` that a mesh has, each once, as the first triangle that has it winds.
+pub fn edges_among(
+    edges: &FxHashSet<EdgeKey>,
+    mesh: &Mesh,
+    border: &Border,
+    path: &Path,
+) -> Vec<[u32; 2]> {
+    edges_along(mesh, border, path, |edge, _| edges.contains(edge))
+}
+
+/// The edges of a mesh whose ends share a plane, as `choose` likes them and their uses.
+fn edges_along(
+    mesh: &Mesh,
+    border: &Border,
+    path: &Path,
+    choose: impl Fn(&EdgeKey, u32) -> bool,
+) -> Vec<[u32; 2]> {
     let bits = path.bits();
-    let mut count: FxHashMap<[PositionKey<f32>; 2], (u32, [u32; 2])> = FxHashMap::default();
+    let mut count: FxHashMap<EdgeKey, (u32, [u32; 2])> = FxHashMap::default();
     if bits == 0 {
         return Vec::new();
     }
     let planes = |vertex: u32| border.planes[vertex as usize] & bits;
     for &[a, b, c] in &mesh.triangles {
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            if planes(from) & planes(to) != 0 {
-                let ends = [from, to].map(|vertex| key(mesh.positions[vertex as usize]));
-                let edge = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
-                count.entry(edge).or_insert((0, [from, to])).0 += 1;
+        for ends in [[a, b], [b, c], [c, a]] {
+            if planes(ends[0]) & planes(ends[1]) != 0 {
+                count.entry(edge_key(mesh, ends)).or_insert((0, ends)).0 += 1;
             }
         }
     }
-    let mut edges: Vec<[u32; 2]> =
-        count.into_values().filter(|(uses, _)| *uses == 1).map(|(_, edge)| edge).collect();
+    let mut edges: Vec<[u32; 2]> = count
+        .into_iter()
+        .filter(|(edge, (uses, _))| choose(edge, *uses))
+        .map(|(_, (_, ends))| ends)
+        .collect();
     edges.sort_unstable();
     edges
 }
@@ -126,4 +157,41 @@ fn walk(
         }
     }
     Some((at, length))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    use crate::build::chain::CutPlane;
+
+    #[test]
+    fn a_border_edge_that_the_mesh_folds_over_is_still_of_the_border() {
+        // Triangles over the edge from 0 to 1, which both lie on the plane.
+        let fan = |apexes: &[u32]| Mesh {
+            positions: vec![
+                [0.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0],
+                [1.0, 0.0, 0.0],
+                [1.0, 0.0, 1.0],
+                [1.0, 0.0, 2.0],
+            ],
+            materials: vec![0; 5],
+            triangles: apexes.iter().map(|&apex| [0, 1, apex]).collect(),
+            ..Mesh::default()
+        };
+        let border = Border { planes: vec![1, 1, 0, 0, 0], keep: vec![0; 5] };
+        let path = Path::default().with(Arc::new(CutPlane::from_chains(0, 0.0, Vec::new())));
+        let open = |mesh: &Mesh| border_edges(mesh, &border, &path);
+        assert_eq!(open(&fan(&[2])), [[0, 1]]);
+        assert_eq!(open(&fan(&[2, 3])), [[0u32; 2]; 0], "it goes on behind the edge");
+        assert_eq!(open(&fan(&[2, 3, 4])), [[0, 1]]);
+
+        let known = [edge_key(&fan(&[2]), [1, 0])].into_iter().collect();
+        for apexes in [&[2][..], &[2, 3], &[2, 3, 4]] {
+            assert_eq!(edges_among(&known, &fan(apexes), &border, &path), [[0, 1]]);
+        }
+        assert!(edges_among(&FxHashSet::default(), &fan(&[2]), &border, &path).is_empty());
+    }
 }

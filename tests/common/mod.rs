@@ -1,6 +1,8 @@
 //! Meshes and a sink in memory for the tests of the build.
 #![allow(dead_code)]
 
+pub mod rays;
+
 use std::sync::Mutex;
 
 use hlod::build::border::{Border, Path};
@@ -22,10 +24,9 @@ impl Random {
     }
 }
 
-/// A closed bumpy ball: a cube's faces as grids of `n` by `n` quads, blown up.
-pub fn ball(n: usize, radius: f64, bump: f64, seed: u64) -> Mesh<f64> {
-    let mut random = Random(seed);
-    let mut bumps = std::collections::BTreeMap::new();
+/// A closed surface: a cube's faces as grids of `n` by `n` quads, each vertex where `place` puts
+/// its grid point, whose coordinates run from -1 to 1.
+fn blown_up(n: usize, mut place: impl FnMut(glam::DVec3) -> glam::DVec3) -> Mesh<f64> {
     let mut mesh = Mesh::<f64>::default();
     let mut numbers = std::collections::BTreeMap::new();
     for face in 0..6 {
@@ -44,13 +45,8 @@ pub fn ball(n: usize, radius: f64, bump: f64, seed: u64) -> Mesh<f64> {
                 let quad = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
                 let mut index = |at: [i64; 3]| {
                     *numbers.entry(at).or_insert_with(|| {
-                        let bump =
-                            *bumps.entry(at).or_insert_with(|| 1.0 + bump * (random.next() - 0.5));
-                        let p = glam::DVec3::new(at[0] as f64, at[1] as f64, at[2] as f64)
-                            .normalize()
-                            * radius
-                            * bump;
-                        mesh.positions.push(p.into());
+                        let p = glam::DVec3::from(at.map(|coordinate| coordinate as f64));
+                        mesh.positions.push(place(p / n as f64).into());
                         mesh.materials.push(0);
                         mesh.positions.len() as u32 - 1
                     })
@@ -64,6 +60,21 @@ pub fn ball(n: usize, radius: f64, bump: f64, seed: u64) -> Mesh<f64> {
         }
     }
     mesh
+}
+
+/// A closed bumpy ball: a cube's faces as grids of `n` by `n` quads, blown up.
+pub fn ball(n: usize, radius: f64, bump: f64, seed: u64) -> Mesh<f64> {
+    let mut random = Random(seed);
+    blown_up(n, |p| p.normalize() * radius * (1.0 + bump * (random.next() - 0.5)))
+}
+
+/// A closed bumpy slab, like a piece of ground with its underside.
+pub fn slab(n: usize, half_size: [f64; 3], bump: f64, seed: u64) -> Mesh<f64> {
+    let mut random = Random(seed);
+    blown_up(n, |p| {
+        let noise: [f64; 3] = std::array::from_fn(|_| bump * (random.next() - 0.5));
+        p * glam::DVec3::from(half_size) + glam::DVec3::from(noise)
+    })
 }
 
 /// An open, textured, bumpy wall of `n` by `m` quads, two charts side by side, with holes.
@@ -116,6 +127,7 @@ pub struct Kept {
     pub budget: usize,
     pub error: f64,
     pub step: LadderStep,
+    pub locked: usize,
 }
 
 /// Keeps all nodes.
@@ -134,6 +146,7 @@ impl NodeSink for MemorySink {
             budget: node.budget,
             error: node.geometric_error,
             step: node.step,
+            locked: node.locked,
         });
         Ok(())
     }

@@ -1,0 +1,220 @@
+//! Any mixture of levels covers the block: no ray gets inside a closed block past the front's
+//! triangles, however different the levels are that meet at a cut.
+//!
+//! Rays are aimed at what is open between the meshes of a front, from all directions and most of
+//! them along the surface, where gaps show. One that reaches a point inside the source, deeper
+//! below its surface than the front may be away from it, before it meets any triangle, has
+//! leaked. Skirts are the triangles that go into the files.
+
+mod common;
+
+use std::collections::BTreeSet;
+
+use common::rays::{Ray, Soup};
+use common::*;
+use glam::DVec3;
+use hlod::build::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
+use hlod::build::simplify::Simplifier;
+use hlod::build::skirt;
+use hlod::mesh::{Mesh, PositionKey};
+
+/// Rays at each front.
+const RAYS: usize = 300;
+
+/// Nodes of a mixture of levels, one over every part of the block.
+type Front<'a> = Vec<&'a Kept>;
+
+/// The front that stops at nodes for which `stop` says so, and at leaves.
+fn front<'a>(nodes: &'a [Kept], mut stop: impl FnMut(&Kept) -> bool) -> Front<'a> {
+    let mut front = Vec::new();
+    let mut open = vec![&nodes[0]];
+    while let Some(node) = open.pop() {
+        let children: Vec<&Kept> = nodes
+            .iter()
+            .filter(|child| {
+                child.place.len() == node.place.len() + 1 && child.place.starts_with(&node.place)
+            })
+            .collect();
+        if children.is_empty() || (node.level > 0 && stop(node)) {
+            front.push(node);
+        } else {
+            open.extend(children);
+        }
+    }
+    front
+}
+
+/// Fronts with neighbours as different as can be, and random ones.
+fn mixed_fronts(nodes: &[Kept], seed: u64) -> Vec<(String, Front<'_>)> {
+    let deepest = nodes.iter().map(|node| node.level).max().unwrap();
+    let mut fronts = Vec::new();
+    // The largest subtrees as they are beside leaves, and the other way round.
+    for parity in 0..2 {
+        let stop = |node: &Kept| node.place[0] % 2 == parity;
+        fronts.push((format!("subtrees of parity {parity} beside leaves"), front(nodes, stop)));
+    }
+    // Alternating at every depth, by all the numbers of the place.
+    for parity in 0..2 {
+        let stop = |node: &Kept| node.place.iter().sum::<u32>() % 2 == parity;
+        fronts.push((format!("checkerboard {parity}"), front(nodes, stop)));
+    }
+    // Two levels apart everywhere: a coarse border meets several finer ones.
+    for coarse in 1..deepest.saturating_sub(1) {
+        let stop = |node: &Kept| {
+            let odd = node.place[coarse - 1] % 2 == 1;
+            node.level == if odd { coarse } else { coarse + 2 }
+        };
+        let stop = |node: &Kept| node.level >= coarse && stop(node);
+        fronts.push((format!("levels {coarse} and {}", coarse + 2), front(nodes, stop)));
+    }
+    let mut random = Random(seed);
+    for share in [0.2, 0.4, 0.6] {
+        fronts.push((format!("random {share}"), front(nodes, |_| random.next() < share)));
+    }
+    fronts
+}
+
+/// The node's triangles as its file has them.
+fn drawn(node: &Kept, with_skirts: bool) -> Mesh {
+    let mut mesh = node.mesh.clone();
+    if with_skirts {
+        skirt::append(&mut mesh, &node.skirts);
+    }
+    mesh
+}
+
+/// Edges at which the meshes of a front are open.
+fn open_edges(front: &Front) -> Vec<[DVec3; 2]> {
+    let uses = edge_uses(front.iter().map(|node| &node.mesh));
+    let mut ends = std::collections::BTreeMap::new();
+    for mesh in front.iter().map(|node| &node.mesh) {
+        for &position in &mesh.positions {
+            ends.insert(hlod::mesh::key(position), DVec3::from(position.map(f64::from)));
+        }
+    }
+    let odd: BTreeSet<[PositionKey<f32>; 2]> =
+        uses.into_iter().filter(|(_, uses)| uses % 2 == 1).map(|(edge, _)| edge).collect();
+    odd.into_iter().map(|edge| edge.map(|end| ends[&end])).collect()
+}
+
+/// A ray through a point beside an open edge, in the plane across the cut that made it.
+fn aimed(edges: &[[DVec3; 2]], reach: f64, far: f64, random: &mut Random) -> Ray {
+    let mut signed = || random.next() * 2.0 - 1.0;
+    let mut direction = DVec3::new(signed(), signed(), signed());
+    let [a, b] = edges[((random.next() * edges.len() as f64) as usize).min(edges.len() - 1)];
+    let mut beside = DVec3::from([0; 3].map(|_| random.next() * 2.0 - 1.0));
+    // From a whole error away down to where only rounding counts.
+    beside *= reach * 10f64.powf(-5.0 * random.next());
+    if let Some(axis) = (0..3).find(|&axis| a[axis] == b[axis]) {
+        beside[axis] = 0.0;
+        // Most rays cross the cut steeply, along the surface.
+        for other in (0..3).filter(|&other| other != axis) {
+            direction[other] *= random.next();
+        }
+    }
+    let aim = a.lerp(b, random.next()) + beside;
+    let direction = direction.normalize_or(DVec3::X);
+    [aim - direction * far, direction]
+}
+
+/// Leaking rays out of [`RAYS`], with and without skirts. `rounding` is what new vertices at cuts
+/// may lie beside the source's surface.
+fn leaks(source: &Soup, front: &Front, far: f64, rounding: f64) -> [usize; 2] {
+    let edges = open_edges(front);
+    if edges.is_empty() {
+        return [0, 0];
+    }
+    let reach = front.iter().map(|node| node.error).fold(0.0, f64::max);
+    let boxes: Vec<(DVec3, DVec3, f64)> = front
+        .iter()
+        .map(|node| {
+            let (low, high) = node.mesh.bounds().unwrap();
+            let corner = |corner: [f32; 3]| DVec3::from(corner.map(f64::from));
+            (corner(low) - node.error, corner(high) + node.error, node.error)
+        })
+        .collect();
+    // Where a node may be, the surface may be as far from the source's as that node's error.
+    let bound = |point: DVec3| {
+        let near = |(low, high, _): &&(DVec3, DVec3, f64)| point.clamp(*low, *high) == point;
+        boxes.iter().filter(near).map(|(_, _, error)| *error).fold(rounding, f64::max)
+    };
+    let drawn = [true, false]
+        .map(|skirts| Soup::new(front.iter().map(|node| drawn(node, skirts)).collect::<Vec<_>>()));
+    let mut random = Random(5);
+    let mut found = [0, 0];
+    for _ in 0..RAYS {
+        let ray = aimed(&edges, reach, far, &mut random);
+        let inside = source.crossings(ray);
+        for (soup, found) in drawn.iter().zip(&mut found) {
+            let stopped = soup.crossings(ray).first().copied().unwrap_or(f64::INFINITY);
+            *found += usize::from(source.is_deep(ray, &inside, stopped, bound));
+        }
+    }
+    found
+}
+
+fn every_option(borders: BorderMode) -> Vec<HierarchyOptions> {
+    let mut all = Vec::new();
+    for level_factor in [2, 4] {
+        for simplify_from in [SimplifyFrom::Original, SimplifyFrom::Children] {
+            for simplifier in [Simplifier::Qem, Simplifier::Clustering] {
+                all.push(HierarchyOptions {
+                    desired_tris: 150,
+                    level_factor,
+                    simplify_from,
+                    simplifier,
+                    borders,
+                    ..Default::default()
+                });
+            }
+        }
+    }
+    all
+}
+
+/// Demands that no ray leaks through any front of a solid, and that rays leak where the same
+/// fronts are drawn without their skirts.
+fn skirts_cover(solid: Mesh<f64>, far: f64) {
+    let (piece, lattice) = block(solid);
+    let source = Soup::new([piece.mesh.clone()]);
+    let mut without = 0;
+    for options in every_option(BorderMode::Skirts) {
+        let nodes = build(piece.clone(), lattice, &options);
+        for (kind, front) in mixed_fronts(&nodes, 11) {
+            let [leaked, leaked_without] = leaks(&source, &front, far, 4.0 * lattice.step);
+            assert_eq!(leaked, 0, "of {RAYS} rays at {kind} of {options:?}");
+            without += leaked_without;
+        }
+    }
+    assert!(without > 100, "only {without} leaks without skirts: the rays are badly aimed");
+}
+
+#[test]
+fn skirts_cover_a_ball_whatever_levels_meet() {
+    skirts_cover(ball(36, 5.0, 0.03, 31), 40.0);
+}
+
+#[test]
+fn skirts_cover_a_slab_whatever_levels_meet() {
+    skirts_cover(slab(32, [12.0, 8.0, 5.0], 0.3, 71), 60.0);
+}
+
+#[test]
+fn locked_borders_leave_nothing_to_cover() {
+    for (solid, far) in [(ball(16, 5.0, 0.03, 3), 40.0), (slab(16, [12.0, 8.0, 5.0], 0.3, 7), 60.0)]
+    {
+        let (piece, lattice) = block(solid);
+        let source = Soup::new([piece.mesh.clone()]);
+        for options in every_option(BorderMode::Locked) {
+            let nodes = build(piece.clone(), lattice, &options);
+            for (kind, front) in mixed_fronts(&nodes, 13) {
+                if options.simplifier == Simplifier::Qem {
+                    assert_eq!(open_edges(&front).len(), 0, "{kind} of {options:?}");
+                }
+                // Clustering may fold the mesh over an edge, which looks open then.
+                let [leaked, _] = leaks(&source, &front, far, 4.0 * lattice.step);
+                assert_eq!(leaked, 0, "of {RAYS} rays at {kind} of {options:?}");
+            }
+        }
+    }
+}
