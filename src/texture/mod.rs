@@ -24,6 +24,7 @@ mod node;
 mod open_page;
 mod pack;
 mod plan;
+mod primitives;
 mod raster;
 mod ring;
 mod scale;

@@ -1,18 +1,17 @@
-//! From a node's working mesh to what its file holds: primitives by surface, atlases, and
-//! texture coordinates that follow the texels.
+//! From a node's working mesh to what its file holds: the atlases that its charts go into, and
+//! where each triangle's texels lie then. What is written of the triangles is
+//! [`super::primitives`].
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-
-use rustc_hash::FxHashMap;
 
 use super::atlas::{Atlas, Page, PatchPlace, Sheet, SheetPicture};
 use super::block::{BlockTextures, Prepared};
 use super::charts::{self, Charts, NO_CHART};
 use super::encode;
 use super::level::LevelPicture;
-use crate::format::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
-use crate::mesh::{AlphaMode, Mesh, Warnings, Wrap};
+use crate::format::{NodeImage, NodeImageData, NodeMesh};
+use crate::mesh::{Mesh, Warnings, Wrap};
 use crate::{Error, Result};
 
 /// Texels per cell of an atlas of a node that has a parent: that one replaces it once a texel is
@@ -44,14 +43,14 @@ pub struct TexturedNode {
 /// From a chart's texture coordinates to a position in its level picture:
 /// `clamp(uv · scale − offset)`, clamped to the picture where it has a limit.
 #[derive(Clone, Copy, Debug)]
-struct Mapping {
+pub(super) struct Mapping {
     scale: [f64; 2],
     offset: [f64; 2],
     limit: [f64; 2],
 }
 
 impl Mapping {
-    fn texel(&self, uv: [f32; 2]) -> [f64; 2] {
+    pub(super) fn texel(&self, uv: [f32; 2]) -> [f64; 2] {
         let uv = charts::sane(uv);
         let along = |axis: usize| {
             let texel = uv[axis] * self.scale[axis] - self.offset[axis];
@@ -63,14 +62,14 @@ impl Mapping {
 
 /// From a position in a level picture to a texture coordinate of an image.
 #[derive(Clone, Copy, Debug)]
-struct Place {
-    image: usize,
+pub(super) struct Place {
+    pub(super) image: usize,
     patch: PatchPlace,
     unit: [f64; 2],
 }
 
 impl Place {
-    fn texcoord(&self, texel: [f64; 2]) -> [f32; 2] {
+    pub(super) fn texcoord(&self, texel: [f64; 2]) -> [f32; 2] {
         let texel = self.patch.texel(texel);
         [0, 1].map(|axis| (texel[axis] * self.unit[axis]) as f32)
     }
@@ -78,19 +77,6 @@ impl Place {
 
 /// The place of triangles without texture.
 const NO_PLACE: u32 = u32::MAX;
-
-/// What primitives are told apart by, besides their image.
-type LookKey = (u8, u32, bool);
-
-/// The triangles of one primitive.
-struct Group {
-    image: Option<usize>,
-    /// Vertices of the mesh and the place of their texels.
-    vertices: Vec<(u32, u32)>,
-    indices: Vec<u32>,
-    /// Materials in order of first use.
-    materials: Vec<u32>,
-}
 
 impl BlockTextures<'_> {
     /// The node of a simplified (or original) piece of the block at `level`, 0 being the root's.
@@ -125,44 +111,22 @@ impl BlockTextures<'_> {
     }
 }
 
-/// The vertices that primitives have so far: one of the mesh becomes two where its triangles'
-/// texels went to different places.
-struct Slots {
-    /// By vertex: the place it was first met with and its slot.
-    first: Vec<Option<(u32, u32)>>,
-    others: FxHashMap<(u32, u32), u32>,
-}
-
-impl Slots {
-    fn new(vertices: usize) -> Self {
-        Self { first: vec![None; vertices], others: FxHashMap::default() }
-    }
-
-    fn get(&mut self, vertex: u32, place: u32, add: impl FnOnce() -> u32) -> u32 {
-        match &mut self.first[vertex as usize] {
-            Some((same, slot)) if *same == place => *slot,
-            Some(_) => *self.others.entry((vertex, place)).or_insert_with(add),
-            empty => empty.insert((place, add())).1,
-        }
-    }
-}
-
-struct NodeBuilder<'a> {
-    block: &'a BlockTextures<'a>,
-    mesh: &'a Mesh,
-    level: usize,
-    charts: Charts,
+pub(super) struct NodeBuilder<'a> {
+    pub(super) block: &'a BlockTextures<'a>,
+    pub(super) mesh: &'a Mesh,
+    pub(super) level: usize,
+    pub(super) charts: Charts,
     /// By chart.
-    chart_textures: Vec<u32>,
+    pub(super) chart_textures: Vec<u32>,
     /// By chart; `None` until its picture is made.
-    mappings: Vec<Option<Mapping>>,
+    pub(super) mappings: Vec<Option<Mapping>>,
     /// By triangle: index into `places`, or [`NO_PLACE`].
-    place_of: Vec<u32>,
-    places: Vec<Place>,
-    images: Vec<NodeImage>,
+    pub(super) place_of: Vec<u32>,
+    pub(super) places: Vec<Place>,
+    pub(super) images: Vec<NodeImage>,
     /// Atlases whose opposite sides meet.
-    wrapping: Vec<usize>,
-    warnings: Warnings,
+    pub(super) wrapping: Vec<usize>,
+    pub(super) warnings: Warnings,
 }
 
 impl<'a> NodeBuilder<'a> {
@@ -462,145 +426,5 @@ impl<'a> NodeBuilder<'a> {
         // What lies below 0 is only ever met with `Clamp`, where it looks like 0; but moving a
         // corner would stretch the triangle's texture, so nothing is cut off.
         Mapping { scale: [1.0; 2], offset, limit: [f64::INFINITY; 2] }
-    }
-
-    /// Groups the triangles by how they look.
-    fn primitives(&self) -> Vec<Primitive> {
-        let mut groups: Vec<Group> = Vec::new();
-        let mut by_look: BTreeMap<(Option<usize>, [u8; 2], LookKey), usize> = BTreeMap::new();
-        let mut last: Option<(u32, Option<usize>, usize)> = None;
-        let mut slots = Slots::new(self.mesh.positions.len());
-        for (triangle, place) in self.mesh.triangles.iter().zip(&self.place_of) {
-            let material = self.mesh.triangle_material(*triangle);
-            let image = self.places.get(*place as usize).map(|place| place.image);
-            let index = match last {
-                Some((same, picture, index)) if same == material && picture == image => index,
-                _ => {
-                    let key = (image, self.wrap_key(material, image), self.look(material));
-                    let index = *by_look.entry(key).or_insert_with(|| {
-                        groups.push(Group {
-                            image,
-                            vertices: Vec::new(),
-                            indices: Vec::new(),
-                            materials: Vec::new(),
-                        });
-                        groups.len() - 1
-                    });
-                    if !groups[index].materials.contains(&material) {
-                        groups[index].materials.push(material);
-                    }
-                    last = Some((material, image, index));
-                    index
-                }
-            };
-            let group = &mut groups[index];
-            for vertex in triangle {
-                let slot = slots.get(*vertex, *place, || {
-                    group.vertices.push((*vertex, *place));
-                    group.vertices.len() as u32 - 1
-                });
-                group.indices.push(slot);
-            }
-        }
-        groups.into_iter().map(|group| self.primitive(group)).collect()
-    }
-
-    /// Alpha and sides of a material, as a key.
-    fn look(&self, material: u32) -> LookKey {
-        let Some(material) = self.block.model.materials.get(material as usize) else {
-            return (0, 0, true);
-        };
-        let (mode, cutoff) = match material.alpha {
-            AlphaMode::Opaque => (0, 0),
-            AlphaMode::Mask { cutoff } => (1, cutoff.to_bits()),
-            AlphaMode::Blend => (2, 0),
-        };
-        (mode, cutoff, material.double_sided)
-    }
-
-    /// The wrapping of a primitive: the material's where the picture is shared; in atlases that of
-    /// the page.
-    fn wrap(&self, material: u32, image: Option<usize>) -> [Wrap; 2] {
-        let shared = image
-            .is_some_and(|image| matches!(self.images[image].data, NodeImageData::Shared { .. }));
-        match self.block.model.materials.get(material as usize) {
-            Some(material) if shared => material.wrap,
-            _ if image.is_some_and(|image| !self.wrapping.contains(&image)) => [Wrap::Clamp; 2],
-            _ => [Wrap::Repeat; 2],
-        }
-    }
-
-    fn wrap_key(&self, material: u32, image: Option<usize>) -> [u8; 2] {
-        self.wrap(material, image).map(|wrap| wrap as u8)
-    }
-
-    fn base_color(&self, material: u32) -> [f32; 4] {
-        let material = self.block.model.materials.get(material as usize);
-        material.map_or([1.0; 4], |material| material.base_color)
-    }
-
-    fn primitive(&self, group: Group) -> Primitive {
-        let mesh = self.mesh;
-        let first = group.materials.first().copied().unwrap_or(0);
-        let (colors, base_color) = self.colors(&group);
-        let texcoords = match group.image {
-            None => Vec::new(),
-            Some(_) => group
-                .vertices
-                .iter()
-                .map(|(vertex, place)| {
-                    let uv = mesh.texcoords[*vertex as usize];
-                    let chart = self.charts.of_vertex[*vertex as usize] as usize;
-                    let mapping = self.mappings.get(chart).copied().flatten();
-                    let (Some(mapping), Some(place)) = (mapping, self.places.get(*place as usize))
-                    else {
-                        return uv;
-                    };
-                    place.texcoord(mapping.texel(uv))
-                })
-                .collect(),
-        };
-        let source = self.block.model.materials.get(first as usize);
-        Primitive {
-            positions: group.vertices.iter().map(|(v, _)| mesh.positions[*v as usize]).collect(),
-            texcoords,
-            colors,
-            surface: Surface {
-                base_color,
-                image: group.image,
-                wrap: self.wrap(first, group.image),
-                alpha: source.map_or(AlphaMode::Opaque, |material| material.alpha),
-                double_sided: source.is_none_or(|material| material.double_sided),
-            },
-            indices: group.indices,
-        }
-    }
-
-    /// Vertex colours, where there must be some, and the factor of all of them.
-    fn colors(&self, group: &Group) -> (Vec<[u16; 4]>, [f32; 4]) {
-        let mesh = self.mesh;
-        let factors: Vec<[f32; 4]> = group.materials.iter().map(|m| self.base_color(*m)).collect();
-        let base = factors.first().copied().unwrap_or([1.0; 4]);
-        let uniform = factors.iter().all(|factor| *factor == base);
-        let color =
-            |vertex: u32| mesh.colors.get(vertex as usize).copied().unwrap_or([u16::MAX; 4]);
-        let white = mesh.colors.is_empty()
-            || group.vertices.iter().all(|(v, _)| color(*v) == [u16::MAX; 4]);
-        if uniform {
-            let colors = if white {
-                Vec::new()
-            } else {
-                group.vertices.iter().map(|(v, _)| color(*v)).collect()
-            };
-            return (colors, base);
-        }
-        let colors = group.vertices.iter().map(|(vertex, _)| {
-            let factor = self.base_color(mesh.materials[*vertex as usize]);
-            let own = color(*vertex);
-            std::array::from_fn(|channel| {
-                (f32::from(own[channel]) * factor[channel].clamp(0.0, 1.0) + 0.5) as u16
-            })
-        });
-        (colors.collect(), [1.0; 4])
     }
 }

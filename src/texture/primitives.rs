@@ -1,0 +1,187 @@
+//! The primitives of a node's file: its triangles grouped by how they look, vertices that become
+//! two where their texels went to different places, and colours and texture coordinates of each.
+
+use std::collections::BTreeMap;
+
+use rustc_hash::FxHashMap;
+
+use super::node::NodeBuilder;
+use crate::format::{NodeImageData, Primitive, Surface};
+use crate::mesh::{AlphaMode, Wrap};
+
+/// What primitives are told apart by, besides their image.
+type LookKey = (u8, u32, bool);
+
+/// The triangles of one primitive.
+struct Group {
+    image: Option<usize>,
+    /// Vertices of the mesh and the place of their texels.
+    vertices: Vec<(u32, u32)>,
+    indices: Vec<u32>,
+    /// Materials in order of first use.
+    materials: Vec<u32>,
+}
+
+/// The vertices that primitives have so far: one of the mesh becomes two where its triangles'
+/// texels went to different places.
+struct Slots {
+    /// By vertex: the place it was first met with and its slot.
+    first: Vec<Option<(u32, u32)>>,
+    others: FxHashMap<(u32, u32), u32>,
+}
+
+impl Slots {
+    fn new(vertices: usize) -> Self {
+        Self { first: vec![None; vertices], others: FxHashMap::default() }
+    }
+
+    fn get(&mut self, vertex: u32, place: u32, add: impl FnOnce() -> u32) -> u32 {
+        match &mut self.first[vertex as usize] {
+            Some((same, slot)) if *same == place => *slot,
+            Some(_) => *self.others.entry((vertex, place)).or_insert_with(add),
+            empty => empty.insert((place, add())).1,
+        }
+    }
+}
+
+impl NodeBuilder<'_> {
+    /// Groups the triangles by how they look.
+    pub(super) fn primitives(&self) -> Vec<Primitive> {
+        let mut groups: Vec<Group> = Vec::new();
+        let mut by_look: BTreeMap<(Option<usize>, [u8; 2], LookKey), usize> = BTreeMap::new();
+        let mut last: Option<(u32, Option<usize>, usize)> = None;
+        let mut slots = Slots::new(self.mesh.positions.len());
+        for (triangle, place) in self.mesh.triangles.iter().zip(&self.place_of) {
+            let material = self.mesh.triangle_material(*triangle);
+            let image = self.places.get(*place as usize).map(|place| place.image);
+            let index = match last {
+                Some((same, picture, index)) if same == material && picture == image => index,
+                _ => {
+                    let key = (image, self.wrap_key(material, image), self.look(material));
+                    let index = *by_look.entry(key).or_insert_with(|| {
+                        groups.push(Group {
+                            image,
+                            vertices: Vec::new(),
+                            indices: Vec::new(),
+                            materials: Vec::new(),
+                        });
+                        groups.len() - 1
+                    });
+                    if !groups[index].materials.contains(&material) {
+                        groups[index].materials.push(material);
+                    }
+                    last = Some((material, image, index));
+                    index
+                }
+            };
+            let group = &mut groups[index];
+            for vertex in triangle {
+                let slot = slots.get(*vertex, *place, || {
+                    group.vertices.push((*vertex, *place));
+                    group.vertices.len() as u32 - 1
+                });
+                group.indices.push(slot);
+            }
+        }
+        groups.into_iter().map(|group| self.primitive(group)).collect()
+    }
+
+    /// Alpha and sides of a material, as a key.
+    fn look(&self, material: u32) -> LookKey {
+        let Some(material) = self.block.model.materials.get(material as usize) else {
+            return (0, 0, true);
+        };
+        let (mode, cutoff) = match material.alpha {
+            AlphaMode::Opaque => (0, 0),
+            AlphaMode::Mask { cutoff } => (1, cutoff.to_bits()),
+            AlphaMode::Blend => (2, 0),
+        };
+        (mode, cutoff, material.double_sided)
+    }
+
+    /// The wrapping of a primitive: the material's where the picture is shared; in atlases that of
+    /// the page.
+    fn wrap(&self, material: u32, image: Option<usize>) -> [Wrap; 2] {
+        let shared = image
+            .is_some_and(|image| matches!(self.images[image].data, NodeImageData::Shared { .. }));
+        match self.block.model.materials.get(material as usize) {
+            Some(material) if shared => material.wrap,
+            _ if image.is_some_and(|image| !self.wrapping.contains(&image)) => [Wrap::Clamp; 2],
+            _ => [Wrap::Repeat; 2],
+        }
+    }
+
+    fn wrap_key(&self, material: u32, image: Option<usize>) -> [u8; 2] {
+        self.wrap(material, image).map(|wrap| wrap as u8)
+    }
+
+    fn base_color(&self, material: u32) -> [f32; 4] {
+        let material = self.block.model.materials.get(material as usize);
+        material.map_or([1.0; 4], |material| material.base_color)
+    }
+
+    fn primitive(&self, group: Group) -> Primitive {
+        let mesh = self.mesh;
+        let first = group.materials.first().copied().unwrap_or(0);
+        let (colors, base_color) = self.colors(&group);
+        let texcoords = match group.image {
+            None => Vec::new(),
+            Some(_) => group
+                .vertices
+                .iter()
+                .map(|(vertex, place)| {
+                    let uv = mesh.texcoords[*vertex as usize];
+                    let chart = self.charts.of_vertex[*vertex as usize] as usize;
+                    let mapping = self.mappings.get(chart).copied().flatten();
+                    let (Some(mapping), Some(place)) = (mapping, self.places.get(*place as usize))
+                    else {
+                        return uv;
+                    };
+                    place.texcoord(mapping.texel(uv))
+                })
+                .collect(),
+        };
+        let source = self.block.model.materials.get(first as usize);
+        Primitive {
+            positions: group.vertices.iter().map(|(v, _)| mesh.positions[*v as usize]).collect(),
+            texcoords,
+            colors,
+            surface: Surface {
+                base_color,
+                image: group.image,
+                wrap: self.wrap(first, group.image),
+                alpha: source.map_or(AlphaMode::Opaque, |material| material.alpha),
+                double_sided: source.is_none_or(|material| material.double_sided),
+            },
+            indices: group.indices,
+        }
+    }
+
+    /// Vertex colours, where there must be some, and the factor of all of them.
+    fn colors(&self, group: &Group) -> (Vec<[u16; 4]>, [f32; 4]) {
+        let mesh = self.mesh;
+        let factors: Vec<[f32; 4]> = group.materials.iter().map(|m| self.base_color(*m)).collect();
+        let base = factors.first().copied().unwrap_or([1.0; 4]);
+        let uniform = factors.iter().all(|factor| *factor == base);
+        let color =
+            |vertex: u32| mesh.colors.get(vertex as usize).copied().unwrap_or([u16::MAX; 4]);
+        let white = mesh.colors.is_empty()
+            || group.vertices.iter().all(|(v, _)| color(*v) == [u16::MAX; 4]);
+        if uniform {
+            let colors = if white {
+                Vec::new()
+            } else {
+                group.vertices.iter().map(|(v, _)| color(*v)).collect()
+            };
+            return (colors, base);
+        }
+        let colors = group.vertices.iter().map(|(vertex, _)| {
+            let factor = self.base_color(mesh.materials[*vertex as usize]);
+            let own = color(*vertex);
+            std::array::from_fn(|channel| {
+                (f32::from(own[channel]) * factor[channel].clamp(0.0, 1.0) + 0.5) as u16
+            })
+        });
+        (colors.collect(), [1.0; 4])
+    }
+}
