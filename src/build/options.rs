@@ -3,6 +3,7 @@
 use super::blocks::BlockMode;
 use super::hierarchy::HierarchyOptions;
 use crate::mesh::UpAxis;
+use crate::report::shortest;
 use crate::{Error, Result};
 
 /// A build's parameters.
@@ -66,8 +67,8 @@ impl BuildOptions {
             "simplifier": hierarchy.simplifier,
             "simplify_from": hierarchy.simplify_from,
             "borders": hierarchy.borders,
-            "texture_weight": hierarchy.weights.texture,
-            "color_weight": hierarchy.weights.color,
+            "texture_weight": shortest(hierarchy.weights.texture),
+            "color_weight": shortest(hierarchy.weights.color),
             "up": self.up,
             "jpeg_quality": self.jpeg_quality,
             "max_atlas": self.max_atlas,

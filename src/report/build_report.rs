@@ -12,7 +12,7 @@ pub struct BuildReport {
     pub version: String,
     /// What it was asked for; the same as [`Scene::parameters`](crate::format::Scene).
     pub parameters: serde_json::Value,
-    /// What it was built from, in the order of the command line.
+    /// What it was built from, in order of path, so that the order of the arguments changes nothing.
     pub inputs: Vec<InputReport>,
     /// Triangles of all inputs after import.
     pub source_triangles: u64,

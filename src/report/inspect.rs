@@ -5,6 +5,7 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use super::build_report::level_reports;
+use super::decimal::shortest;
 use crate::format::{Node, SCENE_VERSION, Scene};
 
 /// Children of one node that [`text`] shows before it sums up the rest.
@@ -55,7 +56,7 @@ fn node_json(scene: &Scene, node: &Node) -> Value {
         "bbox_max": node.bbox_max,
         "cost": node.cost,
         "static_benefit": node.static_benefit,
-        "average_normal": node.average_normal,
+        "average_normal": node.average_normal.map(shortest),
         "geometric_error": node.geometric_error,
         "texels": node.texels,
         "pictures": node.pictures,

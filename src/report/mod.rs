@@ -2,6 +2,8 @@
 
 pub mod build_report;
 pub mod build_summary;
+mod decimal;
 pub mod inspect;
 
 pub use build_report::BuildReport;
+pub use decimal::shortest;
