@@ -197,7 +197,12 @@ impl State {
         self.others.clear();
         let priority = |&node: &u32| (node, replay.policy.priority(replay.tree, node, view));
         self.others.extend(self.stale.iter().map(priority));
-        residency.set_priorities(&self.selection.priorities, &self.others);
+        let Selection { front, priorities, .. } = &self.selection;
+        residency.set_priorities(priorities, &self.others);
+        residency.set_needed(front.iter().copied());
+        if replay.options.selection.all_siblings {
+            residency.set_needed(priorities.iter().map(|&(node, _)| node));
+        }
         record.waiting = residency.waiting() as u32;
         Ok(())
     }

@@ -1,6 +1,8 @@
 //! What is loaded next, and what makes room for it.
 
 use super::ledger::Ledger;
+use super::room::Promises;
+use super::worth::Worth;
 use super::{PriorityList, ResidencyOptions, Sizes};
 use crate::runtime::SceneTree;
 use crate::{Error, Result};
@@ -73,36 +75,39 @@ pub struct Counters {
 /// never leave.
 #[derive(Clone, Debug)]
 pub struct Residency {
-    options: ResidencyOptions,
-    sizes: Sizes,
-    ledger: Ledger,
-    list: PriorityList,
-    states: Vec<NodeState>,
-    parents: Vec<Option<u32>>,
+    pub(super) options: ResidencyOptions,
+    pub(super) sizes: Sizes,
+    pub(super) ledger: Ledger,
+    pub(super) list: PriorityList,
+    pub(super) states: Vec<NodeState>,
+    pub(super) parents: Vec<Option<u32>>,
     /// By node: children that are not absent.
-    children_held: Vec<u32>,
+    pub(super) children_held: Vec<u32>,
     /// By node: bytes to be read in all, fixed when its load begins.
-    to_read: Vec<u64>,
+    pub(super) to_read: Vec<u64>,
     /// By shared picture: whether it is in memory.
-    textures_held: Vec<bool>,
+    pub(super) textures_held: Vec<bool>,
     /// By node: the frame in which it was visited last.
-    visited: Vec<u64>,
-    frame: u64,
+    pub(super) visited: Vec<u64>,
+    pub(super) worth: Worth,
+    /// By node: the last frame in which it was drawn, or its children were visited in its place.
+    pub(super) needed: Vec<u64>,
+    pub(super) frame: u64,
     /// Loaded, in the order in which they were.
     arrivals: Vec<u32>,
     /// Leaving.
-    leaving: Vec<u32>,
+    pub(super) leaving: Vec<u32>,
     /// Shared pictures in memory that only a load needed that was given up; drawing lets go of
     /// them, and their memory is free, at the next frame.
     orphans: Vec<u32>,
     /// Being read or suspended.
-    loading: Vec<u32>,
+    pub(super) loading: Vec<u32>,
     /// The load that was given the last portion.
     current: Option<u32>,
-    resident: usize,
+    pub(super) resident: usize,
     /// Where [`Residency::stale`] goes on.
     cursor: usize,
-    counters: Counters,
+    pub(super) counters: Counters,
 }
 
 impl Residency {
@@ -119,6 +124,8 @@ impl Residency {
             to_read: vec![0; nodes],
             textures_held: vec![false; sizes.textures.len()],
             visited: vec![0; nodes],
+            worth: Worth::new(nodes),
+            needed: vec![0; nodes],
             frame: 0,
             arrivals: Vec::new(),
             leaving: Vec::new(),
@@ -156,7 +163,7 @@ impl Residency {
     }
 
     /// Bytes of the files that loading a node reads.
-    fn files(&self, node: u32, held: &[bool]) -> u64 {
+    pub(super) fn files(&self, node: u32, held: &[bool]) -> u64 {
         let size = &self.sizes.nodes[node as usize];
         let missing = size.textures.iter().filter(|&&texture| !held[texture as usize]);
         size.file_bytes + missing.map(|&t| self.sizes.textures[t as usize].file_bytes).sum::<u64>()
@@ -222,9 +229,22 @@ impl Residency {
         self.frame += 1;
         for &(node, _) in visited {
             self.visited[node as usize] = self.frame;
+            if let Some(parent) = self.parents[node as usize] {
+                self.needed[parent as usize] = self.frame;
+            }
         }
+        self.worth.update(self.frame, visited);
         self.list.update(visited);
         self.list.update(others);
+    }
+
+    /// Says which nodes the frame draws, or could not draw their siblings without. Together with
+    /// the parents of those visited, they are what brought selection to where it is: should one
+    /// leave, what stands below it and its siblings would no longer be visited.
+    pub fn set_needed(&mut self, nodes: impl IntoIterator<Item = u32>) {
+        for node in nodes {
+            self.needed[node as usize] = self.frame;
+        }
     }
 
     /// Nodes in memory that the last frame did not visit, at most `count`, in turn: their
@@ -248,30 +268,24 @@ impl Residency {
     /// changes.
     pub fn next_step(&mut self) -> Option<Step> {
         let mut at = self.list.first_unloaded();
-        let mut tried = 0;
-        // What leaves at the next frame has been promised to a node: less important ones that
-        // began now would only be given up for it.
-        let mut promised = false;
+        let mut promises = Promises::default();
         while let Some(node) = at {
             at = self.list.after(node);
-            match self.states[node as usize] {
+            let state = self.states[node as usize];
+            match state {
                 NodeState::Absent if self.visited[node as usize] != self.frame => {
                     self.list.remove(node); // no longer of interest to anyone
                 }
-                NodeState::Absent if !promised && self.wants(node) => {
-                    if self.make_room(node) {
-                        self.begin(node);
-                        return Some(self.portion(node));
-                    }
-                    promised = !self.leaving.is_empty();
-                    tried += 1;
+                NodeState::Absent if self.wants(node) && self.make_room(node, &mut promises) => {
+                    self.begin(node);
+                    return Some(self.portion(node));
                 }
                 NodeState::Loading { .. } if self.visited[node as usize] == self.frame => {
                     return Some(self.portion(node));
                 }
                 _ => {}
             }
-            if tried == CANDIDATES {
+            if promises.tried == CANDIDATES {
                 break;
             }
         }
@@ -379,13 +393,13 @@ impl Residency {
         }
     }
 
-    fn end_reading(&mut self, node: u32) {
+    pub(super) fn end_reading(&mut self, node: u32) {
         self.ledger.release_read(self.to_read[node as usize]);
         self.loading.retain(|&other| other != node);
     }
 
     /// Gives back what was reserved for a load that will not be finished.
-    fn forget_load(&mut self, node: u32, state: NodeState) {
+    pub(super) fn forget_load(&mut self, node: u32, state: NodeState) {
         let (held, orphans) = (&self.textures_held, &mut self.orphans);
         self.ledger.release_load(&self.sizes, node, held, orphans);
         self.states[node as usize] = state;
@@ -406,95 +420,5 @@ impl Residency {
         if let Some(parent) = self.parents[node as usize] {
             self.children_held[parent as usize] -= 1;
         }
-    }
-
-    /// True where there is room for a node; otherwise room is made where what is less important
-    /// suffices, which is free from the next frame on. Nothing is given up in vain.
-    fn make_room(&mut self, node: u32) -> bool {
-        let needed = |this: &Self| {
-            this.ledger.held(&this.sizes, node) + this.files(node, &this.textures_held)
-        };
-        if needed(self) <= self.ledger.free() {
-            return true;
-        }
-        let leaving: u64 = self.leaving.iter().map(|&node| self.least_freed(node)).sum();
-        let mut missing = needed(self).saturating_sub(self.ledger.free() + leaving);
-        if missing == 0 {
-            return false; // room has been made and is free at the next frame
-        }
-        let priority = self.list.priority(node);
-        // Loads under way that matter less go first: nothing of them is drawn.
-        let mut abandoned = Vec::new();
-        for &other in &self.loading {
-            if missing > 0 && other != node && self.gives_way(other, priority) {
-                let freed = self.least_freed(other) + self.to_read[other as usize];
-                missing = missing.saturating_sub(freed);
-                abandoned.push(other);
-            }
-        }
-        let mut victims = Vec::new();
-        let mut at = self.list.last();
-        while let (Some(other), true) = (at, missing > 0) {
-            if self.list.priority(other) * (1.0 + self.options.evict_margin) >= priority {
-                break;
-            }
-            at = self.list.before(other);
-            if self.may_leave(other, &victims) && !self.is_above(other, node) {
-                missing = missing.saturating_sub(self.least_freed(other));
-                victims.push(other);
-                // Its parent may leave now, and may have been passed on the way here.
-                if let Some(parent) = self.parents[other as usize]
-                    && self.list.precedes_or_is(other, parent)
-                {
-                    at = Some(parent);
-                }
-            }
-        }
-        if missing > 0 {
-            return false;
-        }
-        for other in abandoned {
-            self.end_reading(other);
-            self.forget_load(other, NodeState::Absent);
-            self.counters.abandoned += 1;
-        }
-        for &other in &victims {
-            self.states[other as usize] = NodeState::Leaving;
-            self.list.set_loaded(other, false);
-            self.resident -= 1;
-        }
-        self.counters.evictions += victims.len() as u64;
-        self.leaving.extend(victims);
-        needed(self) <= self.ledger.free()
-    }
-
-    /// A load under way that is of less importance than `priority`, or that nobody asks for.
-    fn gives_way(&self, other: u32, priority: f64) -> bool {
-        self.visited[other as usize] != self.frame
-            || self.list.priority(other) * (1.0 + self.options.evict_margin) < priority
-    }
-
-    /// Resident, not a root, and without children in memory other than `victims`.
-    fn may_leave(&self, node: u32, victims: &[u32]) -> bool {
-        if self.states[node as usize] != NodeState::Resident
-            || self.parents[node as usize].is_none()
-            || victims.contains(&node)
-        {
-            return false;
-        }
-        let held = self.children_held[node as usize];
-        let leaving = |&&other: &&u32| self.parents[other as usize] == Some(node);
-        held == 0 || held as usize == victims.iter().filter(leaving).count()
-    }
-
-    /// Whether `above` is an ancestor of `node`.
-    fn is_above(&self, above: u32, node: u32) -> bool {
-        std::iter::successors(self.parents[node as usize], |&at| self.parents[at as usize])
-            .any(|at| at == above)
-    }
-
-    /// Bytes that are free for certain once a node is gone; shared pictures may stay.
-    fn least_freed(&self, node: u32) -> u64 {
-        self.sizes.nodes[node as usize].held_bytes
     }
 }

@@ -6,9 +6,11 @@ mod ledger;
 mod list;
 mod manager;
 mod options;
+mod room;
 mod sizes;
 #[cfg(test)]
 mod tests;
+mod worth;
 
 pub use list::PriorityList;
 pub use manager::{Changes, Counters, NodeState, Residency, Step};

@@ -79,10 +79,11 @@ fn load_all(residency: &mut Residency) -> Vec<u32> {
     loaded
 }
 
-/// Frames until nothing changes any more; the nodes loaded and left, in order.
+/// Frames until nothing changes any more, for which what nodes were worth lately has to be
+/// forgotten; the nodes loaded and left, in order.
 fn settle(residency: &mut Residency, priorities: &[(u32, f64)]) -> (Vec<u32>, Vec<u32>) {
     let (mut loaded, mut left) = (Vec::new(), Vec::new());
-    for _ in 0..50 {
+    for _ in 0..130 {
         left.extend(residency.begin_frame().left);
         residency.set_priorities(priorities, &[]);
         loaded.extend(load_all(residency));
@@ -366,4 +367,101 @@ fn pictures_that_only_a_load_kept_are_let_go_of_when_it_is_given_up() {
     assert_eq!(residency.begin_frame().left_textures, [0]);
     assert!(!residency.has_texture(0));
     check(&residency, &tree, &sizes, cap);
+}
+
+/// Selection as far as residency knows it: children are drawn where all of them are there.
+fn select(
+    residency: &Residency,
+    tree: &SceneTree,
+    priority: &[f64],
+) -> (Vec<(u32, f64)>, Vec<u32>) {
+    let (mut visited, mut front) = (Vec::new(), Vec::new());
+    let mut queue = tree.roots().to_vec();
+    queue.iter().for_each(|&root| visited.push((root, priority[root as usize])));
+    while let Some(node) = queue.pop() {
+        let children = tree.children(node);
+        visited.extend(children.iter().map(|&child| (child, priority[child as usize])));
+        let there = |&child: &u32| residency.state(child) == NodeState::Resident;
+        match !children.is_empty() && children.iter().all(there) {
+            true => queue.extend(children),
+            false => front.push(node),
+        }
+    }
+    (visited, front)
+}
+
+/// Frames of a camera that stands still; what was loaded and made room in each.
+fn stand(tree: &SceneTree, residency: &mut Residency, priority: &[f64], frames: usize) -> Vec<u64> {
+    (0..frames)
+        .map(|_| {
+            let before = residency.counters();
+            residency.begin_frame();
+            let (visited, front) = select(residency, tree, priority);
+            residency.set_priorities(&visited, &[]);
+            residency.set_needed(front);
+            load_all(residency);
+            let now = residency.counters();
+            now.loads + now.evictions - before.loads - before.evictions
+        })
+        .collect()
+}
+
+/// A node far down matters more than a sibling of its parent, without which neither is drawn.
+#[test]
+fn a_node_does_not_push_out_what_selection_comes_to_it_by() {
+    let tree = two_levels();
+    for spare in 0..6 {
+        let cap = (2 + spare) * HELD + FILE;
+        let mut residency = started(&tree, sizes(7), options(cap));
+        let priority = [9.0, 3.0, 8.0, 7.0, 1.0, 0.5, 0.4];
+        let done = stand(&tree, &mut residency, &priority, 60);
+        assert_eq!(done[20..].iter().sum::<u64>(), 0, "spare {spare}: {done:?}");
+        check(&residency, &tree, &sizes(7), cap);
+    }
+}
+
+#[test]
+fn room_is_made_for_several_nodes_in_a_frame() {
+    let tree = tree(vec![sketch([0.0; 3], 1.0, (0..8).map(|_| leaf()).collect())]);
+    // Room for the root and four children, and to read four more at once.
+    let cap = 5 * HELD + 4 * FILE;
+    let mut residency = started(&tree, sizes(9), options(cap));
+    let half = |first: u32| {
+        let other = first ^ 4;
+        (first..first + 4).map(|n| (n + 1, 5.0)).chain((other..other + 4).map(|n| (n + 1, 0.1)))
+    };
+    let first: Vec<_> = [(0, 9.0)].into_iter().chain(half(0)).collect();
+    settle(&mut residency, &first);
+    let then: Vec<_> = [(0, 9.0)].into_iter().chain(half(4)).collect();
+    let mut frames = 0;
+    let settled = |residency: &Residency| (5..9).all(|n| residency.state(n) == NodeState::Resident);
+    // What was worth more lately stays for a while.
+    while !settled(&residency) {
+        residency.begin_frame();
+        residency.set_priorities(&then, &[]);
+        load_all(&mut residency);
+        check(&residency, &tree, &sizes(9), cap);
+        let swapped = residency.counters().evictions > 0;
+        frames += usize::from(swapped);
+        assert!(frames < 5, "{frames} frames for four nodes");
+    }
+}
+
+/// Of two halves of the nodes one is in view at a time, and there is room for one of them.
+#[test]
+fn looking_to_and_fro_loads_nothing_again() {
+    let tree = tree(vec![sketch([0.0; 3], 1.0, (0..8).map(|_| leaf()).collect())]);
+    let cap = 5 * HELD + FILE;
+    let mut residency = started(&tree, sizes(9), options(cap));
+    let mut late = 0;
+    for frame in 0..600 {
+        let seen = |node: u32| ((node - 1) / 4 == frame / 15 % 2) as u8 as f64;
+        let all = (1..9).map(|node| (node, 1.0 + 1.275 * seen(node) + 0.01 * f64::from(node)));
+        residency.begin_frame();
+        residency.set_priorities(&[(0, 9.0)].into_iter().chain(all).collect::<Vec<_>>(), &[]);
+        let loaded = load_all(&mut residency);
+        late += if frame > 60 { loaded.len() } else { 0 };
+        check(&residency, &tree, &sizes(9), cap);
+    }
+    assert_eq!(late, 0);
 }

@@ -1,0 +1,140 @@
+//! What makes room for a node.
+
+use super::Residency;
+use super::manager::NodeState;
+
+/// Room that is kept for nodes until they can begin to load, in order of their priority.
+#[derive(Debug, Default)]
+pub(super) struct Promises {
+    /// Nodes that could not begin: they wait for room that is being made, or there is none.
+    pub tried: usize,
+    /// Those that wait.
+    nodes: Vec<u32>,
+    /// Bytes that these take.
+    bytes: u64,
+}
+
+impl Residency {
+    /// True where there is room for a node, beside what `promises` keeps for more important ones.
+    /// Otherwise room is made where what is less important suffices, which is free from the next
+    /// frame on and is promised to the node. Nothing is given up in vain.
+    pub(super) fn make_room(&mut self, node: u32, promises: &mut Promises) -> bool {
+        let missing = self.missing(node, promises);
+        // Room for more than can be taken over in a frame would be empty for a while.
+        let too_much = !promises.nodes.is_empty()
+            && promises.bytes + self.needed_bytes(node) > self.options.upload_bytes;
+        if missing > 0 && (too_much || !self.evict(node, missing, promises)) {
+            promises.tried += 1;
+            return false;
+        }
+        let needed = self.needed_bytes(node);
+        if needed <= self.ledger.free() && self.missing(node, promises) == 0 {
+            return true;
+        }
+        promises.tried += 1;
+        promises.bytes += needed;
+        promises.nodes.push(node);
+        false
+    }
+
+    /// Bytes that loading a node takes now.
+    fn needed_bytes(&self, node: u32) -> u64 {
+        self.ledger.held(&self.sizes, node) + self.files(node, &self.textures_held)
+    }
+
+    /// Bytes that a node and those before it lack even at the next frame.
+    fn missing(&self, node: u32, promises: &Promises) -> u64 {
+        let leaving: u64 = self.leaving.iter().map(|&node| self.least_freed(node)).sum();
+        let needed = promises.bytes + self.needed_bytes(node);
+        needed.saturating_sub(self.ledger.free() + leaving)
+    }
+
+    /// Frees `missing` bytes of what is less important than a node; false, and nothing done,
+    /// where that does not suffice.
+    fn evict(&mut self, node: u32, mut missing: u64, promises: &Promises) -> bool {
+        let priority = self.list.priority(node);
+        // Loads under way that matter less go first: nothing of them is drawn.
+        let mut abandoned = Vec::new();
+        for &other in &self.loading {
+            if missing > 0 && other != node && self.gives_way(other, priority) {
+                let freed = self.least_freed(other) + self.to_read[other as usize];
+                missing = missing.saturating_sub(freed);
+                abandoned.push(other);
+            }
+        }
+        let mut victims = Vec::new();
+        let mut at = self.list.last();
+        while let (Some(other), true) = (at, missing > 0) {
+            let margin = 1.0 + self.options.evict_margin;
+            if self.list.priority(other) * margin >= priority {
+                break;
+            }
+            at = self.list.before(other);
+            let leads = |&for_node: &u32| self.leads_to(other, for_node);
+            if self.worth.of(other) * margin < priority
+                && self.may_leave(other, &victims)
+                && !leads(&node)
+                && !promises.nodes.iter().any(leads)
+            {
+                missing = missing.saturating_sub(self.least_freed(other));
+                victims.push(other);
+                // Its parent may leave now, and may have been passed on the way here.
+                if let Some(parent) = self.parents[other as usize]
+                    && self.list.precedes_or_is(other, parent)
+                {
+                    at = Some(parent);
+                }
+            }
+        }
+        if missing > 0 {
+            return false;
+        }
+        for other in abandoned {
+            self.end_reading(other);
+            self.forget_load(other, NodeState::Absent);
+            self.counters.abandoned += 1;
+        }
+        for &other in &victims {
+            self.states[other as usize] = NodeState::Leaving;
+            self.list.set_loaded(other, false);
+            self.resident -= 1;
+        }
+        self.counters.evictions += victims.len() as u64;
+        self.leaving.extend(victims);
+        true
+    }
+
+    /// A load under way that is of less importance than `priority`, or that nobody asks for.
+    fn gives_way(&self, other: u32, priority: f64) -> bool {
+        self.visited[other as usize] != self.frame
+            || self.list.priority(other) * (1.0 + self.options.evict_margin) < priority
+    }
+
+    /// Resident, not a root, and without children in memory other than `victims`.
+    fn may_leave(&self, node: u32, victims: &[u32]) -> bool {
+        if self.states[node as usize] != NodeState::Resident
+            || self.parents[node as usize].is_none()
+            || victims.contains(&node)
+        {
+            return false;
+        }
+        let held = self.children_held[node as usize];
+        let leaving = |&&other: &&u32| self.parents[other as usize] == Some(node);
+        held == 0 || held as usize == victims.iter().filter(leaving).count()
+    }
+
+    /// Whether selection would no longer come to `node` if `other` left: `other` is an ancestor,
+    /// or one of those that are drawn together with an ancestor or not at all. It would come back
+    /// as soon as `node` is no longer asked for, and make room again for it, and so on.
+    fn leads_to(&self, other: u32, node: u32) -> bool {
+        let above = self.parents[other as usize];
+        let needed = self.needed[other as usize] == self.frame;
+        std::iter::successors(self.parents[node as usize], |&at| self.parents[at as usize])
+            .any(|at| at == other || needed && above == Some(at))
+    }
+
+    /// Bytes that are free for certain once a node is gone; shared pictures may stay.
+    fn least_freed(&self, node: u32) -> u64 {
+        self.sizes.nodes[node as usize].held_bytes
+    }
+}

@@ -1,0 +1,81 @@
+//! What nodes were worth lately.
+
+/// Frames for which a node stays worth what it was, at least; twice as many at most.
+const KEPT_FRAMES: u64 = 30;
+
+/// The highest priority that nodes had lately.
+///
+/// Where the camera looks to and fro, half of the nodes lose much of their priority with every
+/// turn and have it back with the next. By what they were worth lately, none makes room for
+/// another that is not worth more than both.
+#[derive(Clone, Debug)]
+pub(super) struct Worth {
+    /// The span of [`KEPT_FRAMES`] frames at hand.
+    span: u64,
+    nodes: Vec<Recent>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Recent {
+    /// The span in which it was visited last.
+    span: u64,
+    /// The highest priority in that span, and in the one before.
+    highest: [f64; 2],
+}
+
+impl Recent {
+    /// The highest priorities of a span and of the one before it.
+    fn at(&self, span: u64) -> [f64; 2] {
+        match span - self.span {
+            0 => self.highest,
+            1 => [0.0, self.highest[0]],
+            _ => [0.0; 2],
+        }
+    }
+}
+
+impl Worth {
+    pub fn new(nodes: usize) -> Self {
+        Self { span: 0, nodes: vec![Recent::default(); nodes] }
+    }
+
+    /// Takes the priorities of the nodes that a frame visited; frames come in order.
+    pub fn update(&mut self, frame: u64, visited: &[(u32, f64)]) {
+        self.span = frame / KEPT_FRAMES;
+        for &(node, priority) in visited {
+            let recent = &mut self.nodes[node as usize];
+            let [highest, before] = recent.at(self.span);
+            *recent = Recent { span: self.span, highest: [highest.max(priority), before] };
+        }
+    }
+
+    /// The highest priority that a node had lately; 0 where it was not visited.
+    pub fn of(&self, node: u32) -> f64 {
+        let [highest, before] = self.nodes[node as usize].at(self.span);
+        highest.max(before)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_node_was_worth_is_kept_for_a_while_and_not_for_ever() {
+        for first in [0, 1, 17, KEPT_FRAMES - 1, KEPT_FRAMES] {
+            let mut worth = Worth::new(2);
+            worth.update(first, &[(0, 5.0), (1, 1.0)]);
+            for after in 1..=3 * KEPT_FRAMES {
+                worth.update(first + after, &[(1, 2.0)]);
+                match after {
+                    ..=KEPT_FRAMES => assert_eq!(worth.of(0), 5.0, "{first} {after}"),
+                    _ if after >= 2 * KEPT_FRAMES => assert_eq!(worth.of(0), 0.0),
+                    _ => assert!([0.0, 5.0].contains(&worth.of(0))),
+                }
+                assert_eq!(worth.of(1), 2.0);
+            }
+            worth.update(first + 3 * KEPT_FRAMES + 1, &[(0, 1.0)]);
+            assert_eq!(worth.of(0), 1.0);
+        }
+    }
+}
