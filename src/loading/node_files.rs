@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::Read;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -75,8 +76,13 @@ impl NodeFiles {
         Reading { node, files, textures, open: None, bytes: Vec::new() }
     }
 
-    /// Checks and decodes a node all of whose bytes were read.
+    /// Checks and decodes a node all of whose bytes were read. A file over which decoding panics
+    /// is one that cannot be used, as any other.
     pub fn finish(&self, reading: Reading) -> Result<Arrival> {
+        guarded(reading.path().to_owned(), || self.decode(reading))
+    }
+
+    fn decode(&self, reading: Reading) -> Result<Arrival> {
         let Reading { node, files, textures, bytes, .. } = reading;
         let entry = &self.scene.nodes[node as usize];
         let (path, size) = &files[0];
@@ -112,7 +118,29 @@ impl NodeFiles {
     }
 }
 
+/// Turns a panic into an error that names the file.
+pub(super) fn guarded<T>(path: PathBuf, decode: impl FnOnce() -> Result<T>) -> Result<T> {
+    // What a panic leaves half done is dropped with it.
+    catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<&str>().copied();
+        let what = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+        let what = what.unwrap_or("no reason was given");
+        Err(Error::input(path, format!("cannot decode: a fault of this program, {what}")))
+    })
+}
+
 impl Reading {
+    /// Which node is read.
+    #[cfg(test)]
+    pub(super) fn node(&self) -> u32 {
+        self.node
+    }
+
+    /// The file of the node.
+    pub(super) fn path(&self) -> &Path {
+        &self.files[0].0
+    }
+
     /// Bytes that are to be read in all.
     fn total(&self) -> u64 {
         self.files.iter().map(|(_, size)| size).sum()

@@ -33,12 +33,21 @@ struct Shared {
 impl LoadingThread {
     /// Starts to load what `residency` asks for.
     pub fn start(files: NodeFiles, residency: Arc<Mutex<Residency>>) -> Result<Self> {
+        Self::start_with(files, residency, NodeFiles::finish)
+    }
+
+    /// The same with another way to decode.
+    fn start_with(
+        files: NodeFiles,
+        residency: Arc<Mutex<Residency>>,
+        decode: Decode,
+    ) -> Result<Self> {
         let (sender, arrivals) = channel();
         let shared = Arc::new(Shared { residency, wake: Condvar::new(), stop: Mutex::new(false) });
         let of_thread = Arc::clone(&shared);
         let handle = std::thread::Builder::new()
             .name("loading".into())
-            .spawn(move || Loader { shared: of_thread, files, sender }.run())
+            .spawn(move || Loader { shared: of_thread, files, sender, decode }.run())
             .map_err(|error| {
                 Error::Internal(format!("cannot start the loading thread: {error}"))
             })?;
@@ -55,6 +64,14 @@ impl LoadingThread {
     pub fn arrivals(&self) -> impl Iterator<Item = Result<Arrival>> + '_ {
         self.arrivals.try_iter()
     }
+
+    /// Fails where the thread has ended, so that nothing will be loaded any more.
+    pub fn check(&self) -> Result<()> {
+        match &self.handle {
+            Some(handle) if !handle.is_finished() => Ok(()),
+            _ => Err(Error::Internal("the loading thread died".into())),
+        }
+    }
 }
 
 impl Drop for LoadingThread {
@@ -64,7 +81,7 @@ impl Drop for LoadingThread {
         }
         self.wake();
         if let Some(handle) = self.handle.take() {
-            // A thread that died has told so by what it did not deliver.
+            // `check` has told of a thread that died.
             let _ = handle.join();
         }
     }
@@ -74,7 +91,11 @@ struct Loader {
     shared: Arc<Shared>,
     files: NodeFiles,
     sender: Sender<Result<Arrival>>,
+    decode: Decode,
 }
+
+/// Makes a node of what was read of its files.
+type Decode = fn(&NodeFiles, Reading) -> Result<Arrival>;
 
 impl Loader {
     fn run(&self) {
@@ -137,7 +158,7 @@ impl Loader {
             readings.insert(step.node, reading);
             return true;
         }
-        let arrival = self.files.finish(reading);
+        let arrival = (self.decode)(&self.files, reading);
         let usable = arrival.is_ok();
         // It is there before anybody is told that it is.
         let sent = self.sender.send(arrival).is_ok();
@@ -150,3 +171,6 @@ impl Loader {
         sent
     }
 }
+
+#[cfg(test)]
+mod tests;

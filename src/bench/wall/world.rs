@@ -63,8 +63,9 @@ impl<'a> WallWorld<'a> {
         &self.broken
     }
 
-    /// Takes what the loading thread delivered.
-    fn receive(&mut self) {
+    /// Takes what the loading thread delivered; fails where it will deliver no more.
+    fn receive(&mut self) -> Result<()> {
+        let alive = self.thread.as_ref().map_or(Ok(()), LoadingThread::check);
         for arrival in self.thread.iter().flat_map(LoadingThread::arrivals) {
             match arrival {
                 Ok(arrival) => {
@@ -73,6 +74,7 @@ impl<'a> WallWorld<'a> {
                 Err(error) => report(&mut self.broken, &error),
             }
         }
+        alive
     }
 
     fn upload(&mut self, arrival: &Arrival) -> Result<()> {
@@ -121,7 +123,7 @@ impl World for WallWorld<'_> {
 
     fn apply(&mut self, changes: &Changes) -> Result<f64> {
         self.frame_start = Instant::now();
-        self.receive();
+        self.receive()?;
         changes.left.iter().for_each(|&node| self.renderer.remove(node));
         changes.left_textures.iter().for_each(|&texture| self.renderer.remove_shared(texture));
         for &node in &changes.arrived {

@@ -1,0 +1,102 @@
+//! What becomes of a run when decoding panics.
+
+use std::fs;
+use std::time::Instant;
+
+use super::*;
+use crate::format::NODES_DIR;
+use crate::loading::node_files::guarded;
+use crate::render::content::{Content, Indices};
+use crate::runtime::SceneTree;
+use crate::runtime::residency::{ResidencyOptions, Sizes};
+use crate::runtime::test_tree::{scene, sketch};
+
+/// Far more than anything here takes.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// The node over which decoding panics.
+const FAULTY: u32 = 2;
+
+fn nothing(files: &NodeFiles, reading: Reading) -> Result<Arrival> {
+    let content = Content {
+        origin: files.scene().nodes[reading.node() as usize].origin.into(),
+        vertices: Vec::new(),
+        indices: Indices::Short(Vec::new()),
+        draws: Vec::new(),
+        pictures: Vec::new(),
+    };
+    Ok(Arrival { node: reading.node(), content, pictures: Vec::new() })
+}
+
+fn faulty(files: &NodeFiles, reading: Reading) -> Result<Arrival> {
+    assert_ne!(reading.node(), FAULTY, "made to fail");
+    nothing(files, reading)
+}
+
+fn faulty_guarded(files: &NodeFiles, reading: Reading) -> Result<Arrival> {
+    guarded(reading.path().to_owned(), || faulty(files, reading))
+}
+
+/// A root with three children, loaded until `done` says so; the states, and the errors.
+fn load(
+    decode: Decode,
+    done: impl Fn(&LoadingThread, &Residency) -> bool,
+) -> (Vec<NodeState>, Vec<String>, Result<()>) {
+    let leaf = || sketch([0.0; 3], 1.0, vec![]);
+    let scene = Arc::new(scene(vec![sketch([0.0; 3], 1.0, vec![leaf(), leaf(), leaf()])]));
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join(NODES_DIR)).unwrap();
+    for node in &scene.nodes {
+        let file = folder.path().join(NODES_DIR).join(&node.file);
+        fs::write(file, vec![0; node.file_bytes as usize]).unwrap();
+    }
+    let tree = SceneTree::new(&scene);
+    let sizes = Sizes::new(&scene, |_, _, _| 100, |_| 0);
+    let mut residency = Residency::new(&tree, sizes, ResidencyOptions::default()).unwrap();
+    let step = residency.load_root(0);
+    residency.portion_read(0, step.bytes);
+    residency.loaded(0);
+    let residency = Arc::new(Mutex::new(residency));
+    let files = NodeFiles::new(folder.path(), Arc::clone(&scene));
+    let thread = LoadingThread::start_with(files, Arc::clone(&residency), decode).unwrap();
+    let mut errors = Vec::new();
+    let start = Instant::now();
+    loop {
+        let mut residency = residency.lock().unwrap();
+        residency.begin_frame();
+        residency.set_priorities(&[(0, 9.0), (1, 3.0), (2, 2.0), (3, 1.0)], &[]);
+        if done(&thread, &residency) || start.elapsed() > PATIENCE {
+            errors.extend(thread.arrivals().filter_map(Result::err).map(|e| e.to_string()));
+            let states = (0..4).map(|node| residency.state(node)).collect();
+            return (states, errors, thread.check());
+        }
+        drop(residency);
+        errors.extend(thread.arrivals().filter_map(Result::err).map(|e| e.to_string()));
+        thread.wake();
+        std::thread::sleep(Duration::from_micros(200));
+    }
+}
+
+#[test]
+fn a_node_over_which_decoding_panics_is_told_of_once_and_the_others_arrive() {
+    let (states, errors, alive) = load(faulty_guarded, |_, residency| {
+        residency.resident() == 3 && residency.state(FAULTY) == NodeState::Broken
+    });
+    use NodeState::{Broken, Resident};
+    assert_eq!(states, [Resident, Resident, Broken, Resident]);
+    assert_eq!(errors.len(), 1, "{errors:?}");
+    assert!(errors[0].contains("n2.glb") && errors[0].contains("made to fail"), "{errors:?}");
+    alive.unwrap();
+}
+
+#[test]
+fn a_thread_that_died_is_an_error() {
+    let (_, errors, alive) = load(faulty, |thread, _| thread.check().is_err());
+    assert_eq!(errors, Vec::<String>::new());
+    let error = alive.unwrap_err();
+    assert!(error.to_string().contains("loading thread died"), "{error}");
+    assert_eq!(error.exit_code(), 1);
+    let (states, _, alive) = load(nothing, |_, residency| residency.resident() == 4);
+    assert_eq!(states, [NodeState::Resident; 4]);
+    alive.unwrap();
+}
