@@ -126,7 +126,7 @@ impl Eye {
     /// Looks at another place.
     fn towards(ground: &Ground, place: DVec3, target: DVec3) -> Self {
         let ahead = target - place;
-        let pitch = ahead.z.atan2(ahead.truncate().length()).to_degrees();
+        let pitch = libm::atan2(ahead.z, ahead.truncate().length()).to_degrees();
         Self::level(ground, place, plan::yaw_deg(ahead.truncate()), pitch)
     }
 }

@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::ground::Ground;
+use super::plan;
 use super::plan::yaw_deg;
 use super::search::Prices;
 use super::streets::Streets;
@@ -85,8 +86,8 @@ impl Circuit {
         let centre = cells.corner + half;
         let radius = half.length().max(step * ROUND_STEPS / std::f64::consts::TAU);
         let point = |index| {
-            let turn = std::f64::consts::TAU * f64::from(index) / f64::from(ROUND_CORNERS);
-            let place = centre + DVec2::from_angle(turn) * radius;
+            let yaw = 360.0 * f64::from(index) / f64::from(ROUND_CORNERS);
+            let place = centre + plan::direction(yaw) * radius;
             place.extend(ground.height_at(place) + ground.eye_height())
         };
         Self { points: (0..ROUND_CORNERS).map(point).collect() }

@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 use super::circuit::Circuit;
 use super::ground::Ground;
 use super::{Eye, WALK_M_S, smooth, travel};
+use crate::camera::angles::turn;
 
 /// The part of the frames that follows the streets: first on foot, then ever higher and faster.
 const STREET_PART: f64 = 0.4;
@@ -38,13 +39,14 @@ pub(super) fn path(ground: &Ground, frames: usize, fps: f64, seed: u64) -> Vec<E
     let first = arc(centre, distance, away, 0.0);
     let way = first - last.place;
     // Grows by equal factors, so that 100 m and 100 km are left behind alike.
-    let growth = (way.length() / (last.place.z - ground.bounds[0].z).abs().max(1e-3)).max(2.0).ln();
+    let height = (last.place.z - ground.bounds[0].z).abs().max(1e-3);
+    let growth = libm::log((way.length() / height).max(2.0));
     for index in 1..=rising {
         let part = index as f64 / rising as f64;
         let eased = part * (2.0 - part);
-        let place = last.place + way * ((growth * eased).exp_m1() / growth.exp_m1());
+        let place = last.place + way * (libm::expm1(growth * eased) / libm::expm1(growth));
         let target = Eye::towards(ground, place, centre);
-        eyes.push(Eye { place, rotation: last.rotation.slerp(target.rotation, smooth(part)) });
+        eyes.push(Eye { place, rotation: turn(last.rotation, target.rotation, smooth(part)) });
     }
     for index in 1..=over {
         let part = smooth(index as f64 / over as f64);
@@ -59,10 +61,11 @@ fn arc(centre: DVec3, distance: f64, away: DVec2, part: f64) -> DVec3 {
     // A half circle, leaning by what lacks from its highest point to the zenith.
     let lean = HIGHEST_DEG.to_radians();
     let sideways = away.perp().extend(0.0);
-    let top = sideways * lean.cos() + DVec3::Z * lean.sin();
-    let begin = (LOWEST_DEG.to_radians().sin() / lean.sin()).asin();
-    let turn = begin + (std::f64::consts::PI - 2.0 * begin) * part;
-    centre + (away.extend(0.0) * turn.cos() + top * turn.sin()) * distance
+    let (lean_sin, lean_cos) = libm::sincos(lean);
+    let top = sideways * lean_cos + DVec3::Z * lean_sin;
+    let begin = libm::asin(libm::sin(LOWEST_DEG.to_radians()) / lean_sin);
+    let (sin, cos) = libm::sincos(begin + (std::f64::consts::PI - 2.0 * begin) * part);
+    centre + (away.extend(0.0) * cos + top * sin) * distance
 }
 
 /// Along the streets, at first on the ground, in the end above every roof.
@@ -72,14 +75,14 @@ fn street(ground: &Ground, frames: usize, fps: f64, seed: u64) -> Vec<Eye> {
         smooth((part - FOOT_PART) / (1.0 - FOOT_PART))
     };
     let route = Circuit::make(ground, seed, WALK_M_S * SPEED_UP / fps);
-    let step = |index: usize| WALK_M_S * SPEED_UP.powf(part(index)) / fps;
+    let step = |index: usize| WALK_M_S * libm::pow(SPEED_UP, part(index)) / fps;
     let places = route.march(frames + travel::ahead(fps), step).unwrap_or_default();
     let yaws = travel::yaws(&places, fps);
     let top = ground.bounds[1].z + 2.0 * ground.eye_height();
     let eye = |(index, (&place, &yaw)): (usize, (&DVec3, &f64))| {
         let rise = (top - place.z).max(ground.eye_height());
         let growth = 1.0 + rise / ground.eye_height();
-        let lift = rise * (growth.powf(part(index)) - 1.0) / (growth - 1.0);
+        let lift = rise * (libm::pow(growth, part(index)) - 1.0) / (growth - 1.0);
         let place = place + DVec3::Z * lift;
         Eye::level(ground, place, yaw, -LOOK_DOWN_DEG * part(index))
     };

@@ -8,6 +8,7 @@ use glam::DVec2;
 use super::fly::WHOLE_IN_VIEW;
 use super::ground::Ground;
 use super::{Eye, plan, smooth};
+use crate::camera::angles::turn;
 
 /// The part of the frames that goes around.
 pub(super) const CIRCLE_PART: f64 = 0.5;
@@ -32,10 +33,11 @@ pub(super) fn path(ground: &Ground, frames: usize) -> Vec<Eye> {
     let middle = centre.truncate();
     let reach = half * BEYOND + 2.0 * ground.eye_height();
     let at = |along: f64| (middle + ahead * along).extend(height);
-    let circle_height = radius * WHOLE_IN_VIEW * ELEVATION_DEG.to_radians().sin();
-    let circle_radius = radius * WHOLE_IN_VIEW * ELEVATION_DEG.to_radians().cos();
+    let (sin, cos) = libm::sincos(ELEVATION_DEG.to_radians());
+    let (circle_height, circle_radius) =
+        (radius * WHOLE_IN_VIEW * sin, radius * WHOLE_IN_VIEW * cos);
     let circle = |part: f64| {
-        let from = DVec2::from_angle(std::f64::consts::TAU * part).rotate(-ahead);
+        let from = plan::direction(360.0 * part).rotate(-ahead);
         centre + (from * circle_radius).extend(circle_height)
     };
     let end = Eye::towards(ground, circle(1.0), centre);
@@ -51,7 +53,7 @@ pub(super) fn path(ground: &Ground, frames: usize) -> Vec<Eye> {
             let begin = Eye::level(ground, at(-reach), yaw, 0.0);
             return Eye {
                 place: end.place.lerp(begin.place, part),
-                rotation: end.rotation.slerp(begin.rotation, part),
+                rotation: turn(end.rotation, begin.rotation, part),
             };
         }
         left -= DESCENT_PART;

@@ -54,12 +54,14 @@ impl Plan {
 
 /// Degrees from the map's x towards its y, as [`from_angles`](crate::camera::from_angles) has it.
 pub(super) fn yaw_deg(direction: DVec2) -> f64 {
-    direction.y.atan2(direction.x).to_degrees()
+    libm::atan2(direction.y, direction.x).to_degrees()
 }
 
 /// The direction of a yaw on the map, of length 1.
 pub(super) fn direction(yaw_deg: f64) -> DVec2 {
-    DVec2::from_angle(yaw_deg.to_radians())
+    // The same on every machine, unlike the system's.
+    let (sin, cos) = libm::sincos(yaw_deg.to_radians());
+    DVec2::new(cos, sin)
 }
 
 #[cfg(test)]

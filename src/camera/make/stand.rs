@@ -53,8 +53,8 @@ pub(super) fn shake(ground: &Ground, frames: usize, fps: f64, seed: u64) -> Vec<
     let ahead = plan::direction(yaw).extend(0.0) * (SHAKE_SWAY_M * ground.scale);
     let eye = |frame: usize| {
         let part = frame as f64 / fps / SHAKE_PERIOD_S;
-        let place = middle + ahead * (TAU * SWAYS * part).sin();
-        Eye::level(ground, place, yaw + SHAKE_TURN_DEG * (TAU * TURNS * part).sin(), 0.0)
+        let place = middle + ahead * libm::sin(TAU * SWAYS * part);
+        Eye::level(ground, place, yaw + SHAKE_TURN_DEG * libm::sin(TAU * TURNS * part), 0.0)
     };
     (0..frames).map(eye).collect()
 }

@@ -76,7 +76,7 @@ fn plane(cells: &Cells, values: &[f32], has: impl Fn(usize) -> bool) -> [f64; 3]
     }
     let count = matrix.x_axis.x;
     // The columns are of like size, so that the determinant tells of cells in one line.
-    let is_flat = matrix.determinant().abs() < 1e-6 * count.powi(3);
+    let is_flat = matrix.determinant().abs() < 1e-6 * (count * count * count);
     if count < SLOPED_PART * cells.len() as f64 || is_flat {
         return [if count > 0.0 { right.x / count } else { 0.0 }, 0.0, 0.0];
     }
