@@ -48,7 +48,7 @@ pub struct SharedTexture {
 
 /// One level of detail of one piece of the city: the attributes that Lakhia's thesis lists in
 /// section 3.3, and ours.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Node {
     /// Unique within the scene, and the same in every build of the same source.
     pub id: u64,

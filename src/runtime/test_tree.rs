@@ -29,6 +29,11 @@ pub(crate) fn scene(trees: Vec<Sketch>) -> Scene {
     for tree in trees {
         add(&mut nodes, tree, None, 0);
     }
+    for node in (0..nodes.len()).rev() {
+        if let Some(parent) = nodes[node].parent {
+            nodes[node].next_sibling = nodes[parent as usize].first_child.replace(node as u32);
+        }
+    }
     Scene {
         parameters: serde_json::json!({}),
         fingerprint: [7; 32],
@@ -39,44 +44,28 @@ pub(crate) fn scene(trees: Vec<Sketch>) -> Scene {
     }
 }
 
-fn add(nodes: &mut Vec<Node>, sketch: Sketch, parent: Option<u32>, level: u32) -> u32 {
+fn add(nodes: &mut Vec<Node>, sketch: Sketch, parent: Option<u32>, level: u32) {
     let index = nodes.len() as u32;
     let corner = |sign: f64| sketch.centre.map(|c| c + sign * sketch.size / 2.0);
     nodes.push(Node {
         id: u64::from(index),
         parent,
-        first_child: None,
-        next_sibling: None,
         level,
         block: Some(0),
         triangles: 10,
-        textured_triangles: 0,
         vertices: 10,
         bbox_min: corner(-1.0),
         bbox_max: corner(1.0),
         cost: sketch.cost,
         static_benefit: sketch.benefit,
         average_normal: sketch.normal,
-        geometric_error: 0.0,
-        texels: 0,
-        pictures: Vec::new(),
-        shared_texels: 0,
-        origin: [0.0; 3],
         file: format!("n{index}.glb"),
         file_bytes: 1000,
-        file_crc: 0,
-        shared_textures: Vec::new(),
+        ..Node::default()
     });
-    let mut before: Option<u32> = None;
     for child in sketch.children {
-        let child = add(nodes, child, Some(index), level + 1);
-        match before {
-            None => nodes[index as usize].first_child = Some(child),
-            Some(before) => nodes[before as usize].next_sibling = Some(child),
-        }
-        before = Some(child);
+        add(nodes, child, Some(index), level + 1);
     }
-    index
 }
 
 pub(crate) fn tree(trees: Vec<Sketch>) -> SceneTree {

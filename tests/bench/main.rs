@@ -16,5 +16,6 @@ mod golden;
 mod model_clock;
 mod output;
 mod stress;
+mod tall_street;
 #[cfg(feature = "render")]
 mod wall;

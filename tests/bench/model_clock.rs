@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use glam::DVec3;
 use hlod::bench::{BenchOptions, ClockConstants, FrameRecord, ModelWorld, Replay, run};
 use hlod::camera::{CameraPath, PathFrame, Pose, from_angles};
-use hlod::format::{BlockInfo, Node, Scene};
+use hlod::format::Scene;
 use hlod::mesh::UpAxis;
 use hlod::runtime::SceneTree;
 use hlod::runtime::lakhia::Lakhia;
@@ -13,6 +13,7 @@ use hlod::runtime::residency::{Residency, Sizes};
 
 use crate::bench_support::{Place, city, hlod_bench};
 use crate::support::result::contents;
+use crate::tall_street::street;
 
 #[test]
 fn the_same_bytes_on_any_number_of_threads_and_from_any_folder() {
@@ -38,73 +39,6 @@ fn the_same_bytes_on_any_number_of_threads_and_from_any_folder() {
             assert!(results[0][file] == other[file], "{file} differs");
         }
     }
-}
-
-/// Houses in two rows, each a tree of four children a node.
-fn street(houses: usize, depth: u32) -> Scene {
-    let mut nodes = Vec::new();
-    for house in 0..houses {
-        let side = if house % 2 == 0 { 15.0 } else { -15.0 };
-        add(&mut nodes, [house as f64 * 8.0, side, 0.0], 12.0, None, 0, depth);
-    }
-    Scene {
-        parameters: serde_json::json!({}),
-        fingerprint: [7; 32],
-        up: UpAxis::Z,
-        blocks: vec![BlockInfo { name: "b".into(), input: "b.obj".into(), origin: [0.0; 3] }],
-        shared_textures: Vec::new(),
-        nodes,
-    }
-}
-
-fn add(
-    nodes: &mut Vec<Node>,
-    at: [f64; 3],
-    size: f64,
-    parent: Option<u32>,
-    level: u32,
-    depth: u32,
-) -> u32 {
-    let index = nodes.len() as u32;
-    let corner = |sign: f64| at.map(|centre| centre + sign * size / 2.0);
-    nodes.push(Node {
-        // The same for a node whatever stands below it.
-        id: u64::from(index),
-        parent,
-        first_child: None,
-        next_sibling: None,
-        level,
-        block: Some(0),
-        triangles: 100,
-        textured_triangles: 0,
-        vertices: 100,
-        bbox_min: corner(-1.0),
-        bbox_max: corner(1.0),
-        cost: 100.0,
-        static_benefit: size,
-        average_normal: [0.0; 3],
-        geometric_error: 0.0,
-        texels: 0,
-        pictures: Vec::new(),
-        shared_texels: 0,
-        origin: [0.0; 3],
-        file: format!("n{index}.glb"),
-        file_bytes: 1000,
-        file_crc: 0,
-        shared_textures: Vec::new(),
-    });
-    let mut before: Option<u32> = None;
-    for quarter in 0..if depth == 0 { 0 } else { 4 } {
-        let [east, up] = [quarter % 2, quarter / 2].map(|part| f64::from(part) * 2.0 - 1.0);
-        let at = [at[0] + east * size / 4.0, at[1], at[2] + up * size / 4.0];
-        let child = add(nodes, at, size / 2.0, Some(index), level + 1, depth - 1);
-        match before {
-            None => nodes[index as usize].first_child = Some(child),
-            Some(before) => nodes[before as usize].next_sibling = Some(child),
-        }
-        before = Some(child);
-    }
-    index
 }
 
 fn replay(scene: &Scene, frames: usize, target_ms: f64) -> Vec<FrameRecord> {
