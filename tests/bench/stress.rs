@@ -153,7 +153,15 @@ impl Rig {
         let used = residency.used_bytes();
         assert!(used <= self.cap && residency.peak_bytes() <= self.cap, "{used} of {}", self.cap);
         let held: u64 = self.nodes.values().chain(self.textures.values()).sum();
-        assert!(held <= used, "{held} bytes are held, {used} are counted");
+        let nodes = self.sizes.nodes.iter().zip(0..);
+        let in_flight: u64 = nodes
+            .map(|(size, node)| match residency.state(node) {
+                NodeState::Loading { .. } => size.held_bytes + size.file_bytes,
+                NodeState::Loaded => size.held_bytes,
+                _ => 0,
+            })
+            .sum();
+        assert!(held + in_flight <= used, "{held} + {in_flight} bytes, {used} are counted");
         for node in 0..self.tree.len() as u32 {
             // Nodes may have been given up since the frame began, never the other way round.
             let resident = residency.state(node) == NodeState::Resident;
