@@ -8,7 +8,7 @@ use crate::runtime::lakhia::TimeModel;
 use crate::{Error, Result};
 
 /// The version of the file that [`ClockConstants::write`] writes.
-pub const CLOCK_FILE_VERSION: u32 = 1;
+pub const CLOCK_FILE_VERSION: u32 = 2;
 
 /// How long things take on some machine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -20,6 +20,8 @@ pub struct ClockConstants {
     pub fixed_ms: f64,
     /// Milliseconds for one unit of cost (`v_time`), above 0.
     pub ms_per_cost: f64,
+    /// What filling the whole picture takes, in units of cost, at least 0.
+    pub fill_cost: f64,
     /// Milliseconds for each node drawn beside its cost, at least 0.
     pub ms_per_node: f64,
     /// Bytes of files that are read and decoded in a millisecond, above 0.
@@ -32,11 +34,12 @@ pub struct ClockConstants {
 impl Default for ClockConstants {
     /// lavapipe on two cores.
     fn default() -> Self {
-        let TimeModel { fixed_ms, ms_per_cost } = TimeModel::default();
+        let TimeModel { fixed_ms, ms_per_cost, fill_cost } = TimeModel::default();
         Self {
             version: CLOCK_FILE_VERSION,
             fixed_ms,
             ms_per_cost,
+            fill_cost,
             ms_per_node: 0.01,
             load_bytes_per_ms: 40_000.0,
             textured_weight: 0.6,
@@ -47,7 +50,11 @@ impl Default for ClockConstants {
 impl ClockConstants {
     /// What selection expects of time before it has seen any.
     pub fn time_model(&self) -> TimeModel {
-        TimeModel { fixed_ms: self.fixed_ms, ms_per_cost: self.ms_per_cost }
+        TimeModel {
+            fixed_ms: self.fixed_ms,
+            ms_per_cost: self.ms_per_cost,
+            fill_cost: self.fill_cost,
+        }
     }
 
     /// Reads constants that were written earlier.
@@ -82,6 +89,7 @@ impl ClockConstants {
         let ranges = [
             ("fixed_ms", self.fixed_ms, self.fixed_ms >= 0.0, "at least 0"),
             ("ms_per_cost", self.ms_per_cost, self.ms_per_cost > 0.0, "above 0"),
+            ("fill_cost", self.fill_cost, self.fill_cost >= 0.0, "at least 0"),
             ("ms_per_node", self.ms_per_node, self.ms_per_node >= 0.0, "at least 0"),
             ("load_bytes_per_ms", self.load_bytes_per_ms, self.load_bytes_per_ms > 0.0, "above 0"),
             (

@@ -5,9 +5,9 @@ use std::sync::Mutex;
 
 use super::replay::lock;
 use super::{ClockConstants, Drawn, World};
-use crate::camera::Pose;
-use crate::runtime::SceneTree;
+use crate::camera::View;
 use crate::runtime::residency::{Changes, Residency};
+use crate::runtime::{SceneTree, covered};
 use crate::{Error, Result};
 
 /// A world in which time follows from the cost model. Nothing is read or drawn.
@@ -47,10 +47,11 @@ impl World for ModelWorld<'_> {
         0.0
     }
 
-    fn draw(&mut self, _: u64, front: &[u32], _: &Pose) -> Result<Drawn> {
+    fn draw(&mut self, _: u64, front: &[u32], view: &View) -> Result<Drawn> {
         let cost: f64 = front.iter().map(|&node| self.tree.node(node).cost).sum();
-        let ClockConstants { fixed_ms, ms_per_cost, ms_per_node, .. } = self.constants;
-        Ok(Drawn { draw_ms: fixed_ms + ms_per_cost * cost + ms_per_node * front.len() as f64 })
+        let ClockConstants { fixed_ms, ms_per_cost, fill_cost, ms_per_node, .. } = self.constants;
+        let load = cost + fill_cost * covered(self.tree, front, view);
+        Ok(Drawn { draw_ms: fixed_ms + ms_per_cost * load + ms_per_node * front.len() as f64 })
     }
 
     fn end_frame(

@@ -25,6 +25,8 @@ pub struct FrameRecord {
     pub v_time: f64,
     /// `shareTime` of the roots, milliseconds.
     pub share_ms: f64,
+    /// The part of the picture that the nodes were expected to cover, 0 to 1.
+    pub covered: f64,
     /// Nodes that gave way to their children.
     pub toggles_up: u32,
     /// Nodes that replaced their children.
@@ -77,6 +79,7 @@ impl FrameRecord {
             "draw_ms",
             "v_time",
             "share_ms",
+            "covered",
             "toggles_up",
             "toggles_down",
             "nodes",
@@ -110,6 +113,7 @@ impl FrameRecord {
             self.draw_ms.to_string(),
             self.v_time.to_string(),
             self.share_ms.to_string(),
+            self.covered.to_string(),
             self.toggles_up.to_string(),
             self.toggles_down.to_string(),
             self.nodes.to_string(),

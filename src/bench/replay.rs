@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use super::{BenchOptions, FrameRecord, Pace};
-use crate::camera::{CameraPath, Pose, View};
+use crate::camera::{CameraPath, View};
 use crate::runtime::residency::{Changes, Residency};
 use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection, ToggleCounter};
 use crate::{Error, Result};
@@ -23,7 +23,7 @@ pub trait World {
     fn now_ms(&mut self) -> f64;
 
     /// Draws nodes; milliseconds that it took.
-    fn draw(&mut self, frame: u64, front: &[u32], pose: &Pose) -> Result<Drawn>;
+    fn draw(&mut self, frame: u64, front: &[u32], view: &View) -> Result<Drawn>;
 
     /// The priorities of a frame were set: loading may go on.
     fn priorities_set(&mut self) {}
@@ -169,7 +169,7 @@ impl State {
         self.set_priorities(replay, &view, &mut record)?;
         replay.world.priorities_set();
 
-        let drawn = replay.world.draw(index as u64, &self.selection.front, &view.pose)?;
+        let drawn = replay.world.draw(index as u64, &self.selection.front, &view)?;
         record.draw_ms = drawn.draw_ms;
         record.actual_ms = record.select_ms + record.draw_ms;
         record.frame_ms = record.actual_ms + record.upload_ms;
@@ -212,6 +212,7 @@ impl State {
         record.estimated_ms = selection.estimated_ms;
         record.estimated_without_feedback_ms = selection.estimated_without_feedback_ms;
         (record.v_time, record.share_ms) = (selection.v_time, selection.share_ms);
+        record.covered = selection.covered;
         (record.visited, record.culled) = (selection.visited() as u32, selection.culled);
         record.nodes = selection.front.len() as u32;
         for &node in &selection.front {

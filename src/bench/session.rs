@@ -115,10 +115,11 @@ impl Session {
         let residency = self.residency(&options)?;
         let weight = constants.unwrap_or_default();
         let tree = self.tree_for(&weight);
-        let measured = self.time_roots(renderer, &tree, path)?;
+        let measured = super::measure_start(renderer, &tree, self.files(), path)?;
         let constants = constants.unwrap_or(ClockConstants {
             fixed_ms: measured.fixed_ms,
             ms_per_cost: measured.ms_per_cost,
+            fill_cost: measured.fill_cost,
             ..ClockConstants::default()
         });
         options.selection.time = constants.time_model();
@@ -157,34 +158,7 @@ impl Session {
         path: &CameraPath,
         renderer: &mut crate::render::Renderer,
     ) -> Result<ClockConstants> {
-        super::calibrate(renderer, &self.tree, &self.files(), path, |_| {})
-    }
-
-    /// Times the roots that can be read, and lets go of them again.
-    #[cfg(feature = "render")]
-    fn time_roots(
-        &self,
-        renderer: &mut crate::render::Renderer,
-        tree: &SceneTree,
-        path: &CameraPath,
-    ) -> Result<crate::runtime::lakhia::TimeModel> {
-        let files = self.files();
-        let mut held = vec![false; self.scene.shared_textures.len()];
-        let mut front = Vec::new();
-        for &root in self.tree.roots() {
-            // What cannot be read is told of by the run itself.
-            let Ok(arrival) = files.read(root, |texture| held[texture as usize]) else { continue };
-            for (texture, picture) in &arrival.pictures {
-                held[*texture as usize] = true;
-                renderer.upload_shared(*texture, picture)?;
-            }
-            renderer.upload(root, 0, &arrival.content)?;
-            front.push(root);
-        }
-        let measured = super::measure_start(renderer, tree, path, &front)?;
-        front.iter().for_each(|&root| renderer.remove(root));
-        (0..held.len() as u32).for_each(|texture| renderer.remove_shared(texture));
-        Ok(measured)
+        super::calibrate(renderer, &self.tree_for(&ClockConstants::default()), self.files(), path)
     }
 }
 

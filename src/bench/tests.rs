@@ -47,7 +47,7 @@ fn walk(frames: usize) -> CameraPath {
 fn options(max_memory_bytes: u64) -> BenchOptions {
     let mut options = BenchOptions::default();
     options.selection.target_ms = 3.0;
-    options.selection.time = TimeModel { fixed_ms: 0.5, ms_per_cost: 0.001 };
+    options.selection.time = TimeModel { fixed_ms: 0.5, ms_per_cost: 0.001, fill_cost: 0.0 };
     options.residency = ResidencyOptions { max_memory_bytes, ..ResidencyOptions::default() };
     options
 }
@@ -56,6 +56,7 @@ fn constants() -> ClockConstants {
     ClockConstants {
         fixed_ms: 0.5,
         ms_per_cost: 0.001,
+        fill_cost: 0.0,
         ms_per_node: 0.0,
         load_bytes_per_ms: 50.0,
         ..ClockConstants::default()

@@ -406,10 +406,11 @@ fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Res
     let constants = session.calibrate(&path, &mut renderer)?;
     constants.write(out)?;
     print(&format!(
-        "an empty frame    {:.2} ms\na unit of cost    {:.6} ms\na node            {:.4} ms\n\
+        "an empty frame    {:.2} ms\na unit of cost    {:.6} ms\nthe whole picture {:.0} units of cost\na node            {:.4} ms\n\
          loading           {:.1} MB/s\nc_textured        {:.3}\nwritten: {}\n",
         constants.fixed_ms,
         constants.ms_per_cost,
+        constants.fill_cost,
         constants.ms_per_node,
         constants.load_bytes_per_ms / 1e3,
         constants.textured_weight,

@@ -14,6 +14,8 @@ pub struct Frustum {
     pub sides: [DVec3; 4],
     /// The line of sight, of length 1.
     pub forward: DVec3,
+    /// What a metre to the right, and a metre up, at a depth of 1 m is of half the picture.
+    across: [DVec3; 2],
 }
 
 impl Frustum {
@@ -33,6 +35,7 @@ impl Frustum {
                 side(-up, half_height),
             ],
             forward,
+            across: [right / half_width, up / half_height],
         }
     }
 
@@ -44,6 +47,42 @@ impl Frustum {
         let half = (bbox[1] - bbox[0]) / 2.0;
         let beyond = |normal: DVec3| -(centre.dot(normal) + half.dot(normal.abs()));
         self.sides.iter().fold(beyond(self.forward).max(0.0), |most, &side| most.max(beyond(side)))
+    }
+
+    /// The part of the picture, 0 to 1, under the smallest upright rectangle around what is seen
+    /// of a box.
+    pub fn covered(&self, bbox: [DVec3; 2]) -> f64 {
+        // Picture plane times depth, and depth.
+        let corner = |index: usize| {
+            let pick = |axis: usize| bbox[index >> axis & 1][axis] - self.eye[axis];
+            let point = DVec3::new(pick(0), pick(1), pick(2));
+            [point.dot(self.across[0]), point.dot(self.across[1]), point.dot(self.forward)]
+        };
+        let corners: [[f64; 3]; 8] = std::array::from_fn(corner);
+        let mut rectangle = [[1.0f64, -1.0]; 2];
+        let mut add = |[x, y, depth]: [f64; 3]| {
+            for (side, at) in rectangle.iter_mut().zip([x / depth, y / depth]) {
+                *side = [side[0].min(at.max(-1.0)), side[1].max(at.min(1.0))];
+            }
+        };
+        let reach = corners.iter().fold(0.0f64, |reach, corner| reach.max(corner[2]));
+        let near = reach * 1e-6; // what is nearer is seen at the picture's edge or beyond
+        if reach <= 0.0 {
+            return 0.0;
+        }
+        for (index, &a) in corners.iter().enumerate() {
+            if a[2] >= near {
+                add(a);
+            }
+            for b in [1, 2, 4].map(|axis| index ^ axis).into_iter().filter(|&b| b > index) {
+                let b = corners[b];
+                if (a[2] < near) != (b[2] < near) {
+                    let part = (near - a[2]) / (b[2] - a[2]);
+                    add(std::array::from_fn(|i| a[i] + part * (b[i] - a[i])));
+                }
+            }
+        }
+        rectangle.iter().map(|[from, to]| ((to - from) / 2.0).max(0.0)).product()
     }
 }
 
@@ -77,6 +116,54 @@ mod tests {
         // At 45° above: (y − |z|) / √2, less the box's half diagonal along the normal, √2.
         let above = frustum.outside(cube(0.0, 14.0, -10.0));
         assert!((above - (4.0 / 2f64.sqrt() - 2f64.sqrt())).abs() < 1e-12, "{above}");
+    }
+
+    /// The part of the picture under a box, by asking 100 × 100 of its rays.
+    fn seen_by_rays(frustum: &Frustum, bbox: [DVec3; 2]) -> Vec<[f64; 2]> {
+        let mut hits = Vec::new();
+        for step in 0..10_000u32 {
+            let [x, y] = [step % 100, step / 100].map(|i| (f64::from(i) + 0.5) / 50.0 - 1.0);
+            let ray = DVec3::new(x * 2.0, y, -1.0); // 90° high, twice as wide
+            let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
+            for axis in 0..3 {
+                let times = bbox.map(|corner| (corner[axis] - frustum.eye[axis]) / ray[axis]);
+                enter = enter.max(times[0].min(times[1]));
+                leave = leave.min(times[0].max(times[1]));
+            }
+            if enter <= leave {
+                hits.push([x, y]);
+            }
+        }
+        hits
+    }
+
+    #[test]
+    fn the_part_covered_is_that_of_the_rectangle_around_the_rays_that_hit() {
+        let frustum = frustum();
+        let long = |x: f64, from: f64, to: f64| {
+            let eye = frustum.eye;
+            [eye + DVec3::new(x, -3.0, from), eye + DVec3::new(x + 1.0, 5.0, to)]
+        };
+        let boxes = [
+            cube(0.0, 0.0, -10.0),
+            cube(3.0, 2.0, -4.0),
+            cube(20.0, 0.0, -10.0),
+            cube(0.0, 0.0, 0.0),
+            long(4.0, -60.0, 20.0),
+            long(-9.0, -60.0, -4.0),
+        ];
+        for bbox in boxes {
+            let hits = seen_by_rays(&frustum, bbox);
+            let range = |axis: usize| {
+                let along = || hits.iter().map(|hit| hit[axis]);
+                along().fold(-1.0, f64::max) - along().fold(1.0, f64::min) + 0.02
+            };
+            let naive = range(0) * range(1) / 4.0;
+            let found = frustum.covered(bbox);
+            assert!(!hits.is_empty() && (found - naive).abs() < 0.02, "{bbox:?} {found} {naive}");
+        }
+        assert_eq!(frustum.covered(cube(0.0, 0.0, 10.0)), 0.0, "behind");
+        assert_eq!(frustum.covered(cube(0.0, 50.0, -10.0)), 0.0, "above");
     }
 
     #[test]

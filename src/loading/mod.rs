@@ -2,6 +2,7 @@
 //! does so beside the thread that draws, in the order that
 //! [`Residency`](crate::runtime::residency::Residency) asks for.
 
+mod background;
 mod node_files;
 mod thread;
 

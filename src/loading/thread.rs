@@ -99,6 +99,7 @@ type Decode = fn(&NodeFiles, Reading) -> Result<Arrival>;
 
 impl Loader {
     fn run(&self) {
+        super::background::give_way();
         let mut readings = BTreeMap::new();
         while let Some((step, reading)) = self.next(&mut readings) {
             if !self.carry_out(step, reading, &mut readings) {

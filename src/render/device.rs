@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{Adapter, DeviceDescriptor, MemoryHints, PollType, Queue, SubmissionIndex};
 
 use super::adapter::{self, AdapterLabel};
+use super::steady;
 use crate::{Error, Result};
 
 /// A graphics device and what it was last heard to complain of.
@@ -49,7 +50,11 @@ impl Device {
         device.set_device_lost_callback(move |reason, what| {
             lost(format!("the graphics device was lost ({reason:?}): {what}"));
         });
-        Ok(Self { device, queue, label: adapter::label(adapter), complaint })
+        let label = adapter::label(adapter);
+        if label.is_processor {
+            steady::bind_rasteriser_threads();
+        }
+        Ok(Self { device, queue, label, complaint })
     }
 
     /// Waits until what was submitted is done.

@@ -28,6 +28,8 @@ mod renderer;
 #[cfg(feature = "render")]
 mod samplers;
 #[cfg(feature = "render")]
+mod steady;
+#[cfg(feature = "render")]
 mod target;
 #[cfg(feature = "render")]
 mod warm_up;

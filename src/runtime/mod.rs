@@ -3,6 +3,7 @@
 //!
 //! Time enters as an argument, so that a run can be replayed exactly.
 
+mod covered;
 pub mod lakhia;
 mod policy;
 pub mod residency;
@@ -11,6 +12,7 @@ pub(crate) mod test_tree;
 mod toggles;
 mod tree;
 
+pub use covered::covered;
 pub use policy::{FrameOutcome, Policy, Residents, Selection};
 pub use toggles::{ToggleCounter, Toggles};
 pub use tree::{SceneTree, TreeNode};

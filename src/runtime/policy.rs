@@ -74,6 +74,9 @@ pub struct Selection {
     pub v_time: f64,
     /// Milliseconds that roots share (`shareTime`); 0 where a policy has no such thing.
     pub share_ms: f64,
+    /// The part of the picture that the front is expected to cover, 0 to 1; 0 where a policy
+    /// does not ask.
+    pub covered: f64,
     /// Of the nodes visited, those outside of the view.
     pub culled: u32,
 }
@@ -84,7 +87,8 @@ impl Selection {
         self.front.clear();
         self.priorities.clear();
         (self.estimated_ms, self.estimated_without_feedback_ms) = (0.0, 0.0);
-        (self.v_time, self.share_ms, self.culled) = (0.0, 0.0, 0);
+        (self.v_time, self.share_ms) = (0.0, 0.0);
+        (self.covered, self.culled) = (0.0, 0);
     }
 
     /// Number of nodes visited.

@@ -35,7 +35,7 @@ pub struct SceneTree {
     /// Children of all nodes, those of one side by side.
     children: Vec<u32>,
     roots: Vec<u32>,
-    diagonal: f64,
+    bounds: [DVec3; 2],
 }
 
 impl SceneTree {
@@ -58,8 +58,8 @@ impl SceneTree {
                 children: first..children.len() as u32,
             });
         }
-        let [min, max] = scene.bounds().unwrap_or_default().map(DVec3::from);
-        Self { nodes, children, roots: scene.roots().collect(), diagonal: (max - min).length() }
+        let bounds = scene.bounds().unwrap_or_default().map(DVec3::from);
+        Self { nodes, children, roots: scene.roots().collect(), bounds }
     }
 
     /// Computes costs anew (eq. 3.1) with another `c_textured` than that of the build: how much
@@ -101,6 +101,11 @@ impl SceneTree {
 
     /// Length of the diagonal of the box around everything, metres.
     pub fn diagonal(&self) -> f64 {
-        self.diagonal
+        self.bounds[0].distance(self.bounds[1])
+    }
+
+    /// The middle of that box.
+    pub fn middle(&self) -> DVec3 {
+        (self.bounds[0] + self.bounds[1]) / 2.0
     }
 }

@@ -57,6 +57,7 @@ fn replay(scene: &Scene, frames: usize, target_ms: f64) -> Vec<FrameRecord> {
     let constants = ClockConstants {
         fixed_ms: 0.5,
         ms_per_cost: 0.001,
+        fill_cost: 0.0,
         ms_per_node: 0.0,
         ..ClockConstants::default()
     };

@@ -1,8 +1,10 @@
 //! Runs on a graphics adapter, by the clock on the wall.
 
 mod calibrate;
+mod fit;
 mod process;
 mod snapshots;
+mod stage;
 mod world;
 
 pub use calibrate::{calibrate, measure_start};

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::{Snapshots, process};
 use crate::bench::replay::lock;
 use crate::bench::{Drawn, World};
-use crate::camera::Pose;
+use crate::camera::View;
 use crate::loading::{Arrival, LoadingThread, NodeFiles};
 use crate::render::Renderer;
 use crate::runtime::SceneTree;
@@ -142,9 +142,9 @@ impl World for WallWorld<'_> {
         self.start.elapsed().as_secs_f64() * 1e3
     }
 
-    fn draw(&mut self, _: u64, front: &[u32], pose: &Pose) -> Result<Drawn> {
+    fn draw(&mut self, _: u64, front: &[u32], view: &View) -> Result<Drawn> {
         let begin = Instant::now();
-        self.renderer.draw(front, pose, self.near)?;
+        self.renderer.draw(front, &view.pose, self.near)?;
         Ok(Drawn { draw_ms: begin.elapsed().as_secs_f64() * 1e3 })
     }
 

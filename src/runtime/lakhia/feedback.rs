@@ -48,24 +48,33 @@ pub(super) struct Feedback {
     pub v_time: f64,
     /// `shareTime` of the roots, milliseconds.
     pub share_ms: f64,
+    /// The fixed overhead, milliseconds.
+    pub fixed_ms: f64,
 }
 
 impl Feedback {
     pub fn new(options: &LakhiaOptions) -> Self {
-        Self { v_time: options.time.ms_per_cost, share_ms: for_nodes(options) }
+        Self {
+            v_time: options.time.ms_per_cost,
+            share_ms: for_nodes(options),
+            fixed_ms: options.time.fixed_ms,
+        }
     }
 
-    /// After a frame whose nodes cost `cost`.
+    /// After a frame that took `load` units of cost beside the fixed overhead.
     pub fn adjust(
         &mut self,
         options: &LakhiaOptions,
-        cost: f64,
+        load: f64,
         outlook: &Outlook,
         actual_ms: f64,
     ) {
-        // The first loop: v_time follows what the frame's nodes took.
-        let observed = (actual_ms - options.time.fixed_ms) / cost;
-        if cost > 0.0 && observed.is_finite() {
+        // The first loop: v_time follows what the frame took.
+        let observed = (actual_ms - self.fixed_ms) / load;
+        if load <= 0.0 {
+            // Nothing was drawn, which is how the overhead is measured.
+            self.fixed_ms += options.v_time_gain * (actual_ms - self.fixed_ms);
+        } else if observed.is_finite() {
             let step = options.v_time_gain * (observed.max(0.0) - self.v_time);
             // Nothing is free, however noisy a clock is.
             self.v_time = (self.v_time + step).max(options.time.ms_per_cost * 1e-3);
@@ -92,9 +101,12 @@ impl Feedback {
     }
 }
 
-/// What the target leaves for nodes; never nothing at all, so that shares keep their order.
+/// What the target leaves for nodes once the picture is filled; never nothing at all, so that
+/// shares keep their order.
 fn for_nodes(options: &LakhiaOptions) -> f64 {
-    (options.target_ms - options.time.fixed_ms).max(0.01 * options.target_ms)
+    let time = &options.time;
+    let fixed_ms = time.fixed_ms + time.ms_per_cost * time.fill_cost;
+    (options.target_ms - fixed_ms).max(0.01 * options.target_ms)
 }
 
 #[cfg(test)]
@@ -103,7 +115,7 @@ mod tests {
     use crate::runtime::lakhia::TimeModel;
 
     fn options() -> LakhiaOptions {
-        let time = TimeModel { fixed_ms: 10.0, ms_per_cost: 0.1 };
+        let time = TimeModel { fixed_ms: 10.0, ms_per_cost: 0.1, fill_cost: 0.0 };
         LakhiaOptions { time, ..LakhiaOptions::default() }
     }
 
@@ -119,7 +131,20 @@ mod tests {
         assert!((feedback.v_time - 0.2).abs() < 1e-6, "{}", feedback.v_time);
         // One frame moves it by the gain, no more.
         feedback.adjust(&options, 100.0, &CALM, 10.0 + 100.0 * 1.2);
-        assert!((feedback.v_time - 0.3).abs() < 1e-6, "{}", feedback.v_time);
+        let moved = 0.2 + options.v_time_gain * (1.2 - 0.2);
+        assert!((feedback.v_time - moved).abs() < 1e-6, "{}", feedback.v_time);
+    }
+
+    #[test]
+    fn a_frame_without_nodes_tells_the_overhead_and_nothing_of_costs() {
+        let (options, mut feedback) = (options(), Feedback::new(&options()));
+        for _ in 0..200 {
+            feedback.adjust(&options, 0.0, &CALM, 14.0);
+        }
+        assert!((feedback.fixed_ms - 14.0).abs() < 1e-6, "{}", feedback.fixed_ms);
+        assert_eq!(feedback.v_time, 0.1);
+        feedback.adjust(&options, 100.0, &CALM, 24.0);
+        assert_eq!(feedback.v_time, 0.1, "what is above that overhead is the nodes'");
     }
 
     /// `shareTime` after a frame, from 20.

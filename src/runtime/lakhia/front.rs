@@ -7,7 +7,7 @@ use super::benefit::{Seen, seen};
 use super::feedback::{Feedback, Outlook};
 use super::hysteresis::Hysteresis;
 use crate::camera::View;
-use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection};
+use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection, covered};
 
 /// The policy of Lakhia's thesis.
 #[derive(Clone, Debug)]
@@ -17,6 +17,8 @@ pub struct Lakhia {
     hysteresis: Hysteresis,
     /// Cost of the front that was chosen last.
     cost: f64,
+    /// The part of the picture that it covers, 0 to 1.
+    covered: f64,
     /// What its siblings would do to later frames.
     outlook: Outlook,
     /// Milliseconds of this frame that nodes met for the first time may still take.
@@ -63,6 +65,7 @@ impl Lakhia {
             options,
             hysteresis: Hysteresis::default(),
             cost: 0.0,
+            covered: 0.0,
             outlook: Outlook::NONE,
             room_ms: 0.0,
             queue: VecDeque::new(),
@@ -179,6 +182,12 @@ impl Lakhia {
         self.cost += tree.node(node).cost;
         out.front.push(node);
     }
+
+    /// What the frame takes beside the fixed overhead, in units of cost: its nodes, and filling
+    /// the part of the picture that they cover, which no choice of level changes.
+    fn load(&self) -> f64 {
+        self.cost + self.options.time.fill_cost * self.covered
+    }
 }
 
 /// `priority / Σ priority` (eq. 4.1); equal parts where none of the siblings matters at all.
@@ -200,7 +209,7 @@ impl Policy for Lakhia {
     ) {
         out.clear();
         self.hysteresis.resize(tree.len());
-        let before_ms = self.options.time.fixed_ms + self.feedback.v_time * self.cost;
+        let before_ms = self.feedback.fixed_ms + self.feedback.v_time * self.load();
         self.room_ms = self.options.target_ms - before_ms;
         (self.cost, self.outlook) = (0.0, Outlook::NONE);
         self.queue.clear();
@@ -209,11 +218,13 @@ impl Policy for Lakhia {
         while let Some(siblings) = self.queue.pop_front() {
             self.visit(tree, siblings, view, residents, out);
         }
+        self.covered = covered(tree, &out.front, view);
         let time = &self.options.time;
+        out.covered = self.covered;
         out.v_time = self.feedback.v_time;
         out.share_ms = self.feedback.share_ms;
-        out.estimated_ms = time.fixed_ms + self.feedback.v_time * self.cost;
-        out.estimated_without_feedback_ms = time.fixed_ms + time.ms_per_cost * self.cost;
+        out.estimated_ms = self.feedback.fixed_ms + self.feedback.v_time * self.load();
+        out.estimated_without_feedback_ms = time.fixed_ms + time.ms_per_cost * self.load();
     }
 
     fn priority(&self, tree: &SceneTree, node: u32, view: &View) -> f64 {
@@ -221,6 +232,6 @@ impl Policy for Lakhia {
     }
 
     fn drawn(&mut self, outcome: &FrameOutcome) {
-        self.feedback.adjust(&self.options, self.cost, &self.outlook, outcome.actual_ms);
+        self.feedback.adjust(&self.options, self.load(), &self.outlook, outcome.actual_ms);
     }
 }

@@ -11,7 +11,7 @@ fn options() -> LakhiaOptions {
         target_ms: 10.0,
         hyst_switch: 1.0,
         hyst_limit: 3.0,
-        time: TimeModel { fixed_ms: 0.0, ms_per_cost: 1.0 },
+        time: TimeModel { fixed_ms: 0.0, ms_per_cost: 1.0, fill_cost: 0.0 },
         v_time_gain: 0.0,
         share_gain: 0.0,
         ..LakhiaOptions::default()
@@ -184,7 +184,7 @@ fn one_sibling_in_need_is_outweighed_by_others_with_plenty() {
 #[test]
 fn the_estimate_is_overhead_and_time_for_the_costs_drawn() {
     let mut options = options();
-    options.time = TimeModel { fixed_ms: 2.0, ms_per_cost: 0.5 };
+    options.time = TimeModel { fixed_ms: 2.0, ms_per_cost: 0.5, fill_cost: 0.0 };
     options.v_time_gain = 1.0;
     let (tree, residents) = (fork(3.0), Residents::all(3));
     let mut policy = Lakhia::new(options);
@@ -194,6 +194,27 @@ fn the_estimate_is_overhead_and_time_for_the_costs_drawn() {
     let selection = select(&mut policy, &tree, &view(), &residents);
     assert_eq!(selection.v_time, 1.0);
     assert_eq!((selection.estimated_ms, selection.estimated_without_feedback_ms), (8.0, 5.0));
+}
+
+#[test]
+fn filling_the_picture_is_estimated_and_no_node_pays_for_it() {
+    let mut options = options();
+    options.time = TimeModel { fixed_ms: 2.0, ms_per_cost: 0.5, fill_cost: 8.0 };
+    options.v_time_gain = 1.0;
+    let (tree, residents) = (fork(3.0), Residents::all(3));
+    let mut policy = Lakhia::new(options);
+    let selection = select(&mut policy, &tree, &view(), &residents);
+    let boxes = [1, 2].map(|node| view().frustum.covered(tree.node(node).bbox));
+    let covered = boxes[0] + boxes[1];
+    assert!(covered > 0.0 && covered < 1.0 && (selection.covered - covered).abs() < 1e-12);
+    let expected = 2.0 + 0.5 * (6.0 + 8.0 * covered);
+    assert!((selection.estimated_ms - expected).abs() < 1e-12);
+    // The share is what the target leaves when all of the picture is filled: 10 − 2 − 4.
+    assert_eq!(selection.share_ms, 4.0);
+    // Twice the time is twice the v_time, fill and all.
+    policy.drawn(&FrameOutcome { actual_ms: 2.0 + 2.0 * (expected - 2.0) });
+    let selection = select(&mut policy, &tree, &view(), &residents);
+    assert!((selection.v_time - 1.0).abs() < 1e-12, "{}", selection.v_time);
 }
 
 #[test]
