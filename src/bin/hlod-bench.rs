@@ -270,7 +270,20 @@ impl RunArgs {
     }
 }
 
+/// Keeps Mesa's device selection from asking for a display, of which there need be none, and from
+/// writing to the console that it found none. It only matters which of several cards comes first,
+/// and that is chosen here by `--adapter`.
+fn hush_device_selection() {
+    const SWITCH: &str = "NODEVICE_SELECT";
+    if std::env::var_os(SWITCH).is_none() && std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        // SAFETY: called before anything else in `main`, while there is no other thread that
+        // could read the environment.
+        unsafe { std::env::set_var(SWITCH, "1") };
+    }
+}
+
 fn main() -> ExitCode {
+    hush_device_selection();
     let cli = Cli::parse();
     let done = match cli.command {
         Some(Command::Compare { base, new, force, json, limits }) => {
