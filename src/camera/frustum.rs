@@ -10,8 +10,9 @@ use super::Pose;
 pub struct Frustum {
     /// Where the sides meet.
     pub eye: DVec3,
-    /// Normals of the left, right, bottom and top side, inward, of length 1.
-    pub sides: [DVec3; 4],
+    /// Normals of the left, right, bottom and top side, inward, of length 1: their x, their y and
+    /// their z, so that a box is held against all sides at a time.
+    sides: [[f64; 4]; 3],
     /// The line of sight, of length 1.
     pub forward: DVec3,
     /// What a metre to the right, and a metre up, at a depth of 1 m is of half the picture.
@@ -26,14 +27,15 @@ impl Frustum {
         let half_width = half_height * aspect;
         let (right, up, forward) = (pose.right(), pose.up(), pose.forward());
         let side = |axis: DVec3, half: f64| (forward * half + axis).normalize();
+        let sides = [
+            side(right, half_width),
+            side(-right, half_width),
+            side(up, half_height),
+            side(-up, half_height),
+        ];
         Self {
             eye: pose.position,
-            sides: [
-                side(right, half_width),
-                side(-right, half_width),
-                side(up, half_height),
-                side(-up, half_height),
-            ],
+            sides: [0, 1, 2].map(|axis| sides.map(|side| side[axis])),
             forward,
             across: [right / half_width, up / half_height],
         }
@@ -42,47 +44,93 @@ impl Frustum {
     /// Metres by which a box is outside of the pyramid: 0 where it may be seen, otherwise the
     /// greatest distance by which the whole of it is beyond one side. Never says that a visible
     /// box is outside; near the edges it may call an invisible one visible.
+    #[inline(always)]
     pub fn outside(&self, bbox: [DVec3; 2]) -> f64 {
         let centre = (bbox[0] + bbox[1]) / 2.0 - self.eye;
         let half = (bbox[1] - bbox[0]) / 2.0;
-        let beyond = |normal: DVec3| -(centre.dot(normal) + half.dot(normal.abs()));
-        self.sides.iter().fold(beyond(self.forward).max(0.0), |most, &side| most.max(beyond(side)))
+        let forward = self.forward;
+        let behind = -(centre.dot(forward) + half.dot(forward.abs()));
+        let [x, y, z] = &self.sides;
+        let beyond: [f64; 4] = std::array::from_fn(|side| {
+            let at = centre.x * x[side] + centre.y * y[side] + centre.z * z[side];
+            let reach = half.x * x[side].abs() + half.y * y[side].abs() + half.z * z[side].abs();
+            -(at + reach)
+        });
+        beyond.into_iter().fold(behind.max(0.0), |most, by| if by > most { by } else { most })
     }
 
     /// The part of the picture, 0 to 1, under the smallest upright rectangle around what is seen
     /// of a box.
     pub fn covered(&self, bbox: [DVec3; 2]) -> f64 {
-        // Picture plane times depth, and depth.
-        let corner = |index: usize| {
-            let pick = |axis: usize| bbox[index >> axis & 1][axis] - self.eye[axis];
-            let point = DVec3::new(pick(0), pick(1), pick(2));
-            [point.dot(self.across[0]), point.dot(self.across[1]), point.dot(self.forward)]
-        };
-        let corners: [[f64; 3]; 8] = std::array::from_fn(corner);
-        let mut rectangle = [[1.0f64, -1.0]; 2];
-        let mut add = |[x, y, depth]: [f64; 3]| {
-            for (side, at) in rectangle.iter_mut().zip([x / depth, y / depth]) {
-                *side = [side[0].min(at.max(-1.0)), side[1].max(at.min(1.0))];
-            }
-        };
-        let reach = corners.iter().fold(0.0f64, |reach, corner| reach.max(corner[2]));
+        // Of all eight corners: picture plane times depth, and depth.
+        let [x, y, depth] = [self.across[0], self.across[1], self.forward].map(|direction| {
+            let [in_x, in_y, in_z]: [[f64; 2]; 3] = std::array::from_fn(|axis| {
+                bbox.map(|corner| (corner[axis] - self.eye[axis]) * direction[axis])
+            });
+            std::array::from_fn(|i| in_x[i & 1] + in_y[i >> 1 & 1] + in_z[i >> 2])
+        });
+        let reach = greatest(depth).max(0.0);
         let near = reach * 1e-6; // what is nearer is seen at the picture's edge or beyond
         if reach <= 0.0 {
             return 0.0;
         }
+        if least(depth) < near {
+            return Rectangle::cut(std::array::from_fn(|i| [x[i], y[i], depth[i]]), near).part();
+        }
+        let ends = [x, y].map(|side| {
+            let at: [f64; 8] = std::array::from_fn(|i| side[i] / depth[i]);
+            [least(at).clamp(-1.0, 1.0), greatest(at).clamp(-1.0, 1.0)]
+        });
+        Rectangle(ends).part()
+    }
+}
+
+fn least(numbers: [f64; 8]) -> f64 {
+    in_pairs(numbers, |a, b| if a < b { a } else { b })
+}
+
+fn greatest(numbers: [f64; 8]) -> f64 {
+    in_pairs(numbers, |a, b| if a > b { a } else { b })
+}
+
+/// What is left of eight numbers once one of every two was picked, three times: in a row, each
+/// pick would wait for the one before.
+fn in_pairs(numbers: [f64; 8], pick: impl Fn(f64, f64) -> f64) -> f64 {
+    let four: [f64; 4] = std::array::from_fn(|i| pick(numbers[i], numbers[i + 4]));
+    pick(pick(four[0], four[2]), pick(four[1], four[3]))
+}
+
+/// A part of the picture, which reaches from −1 to 1: from and to, across and up.
+struct Rectangle([[f64; 2]; 2]);
+
+impl Rectangle {
+    /// Around what a box with these corners has beyond a depth of `near`.
+    fn cut(corners: [[f64; 3]; 8], near: f64) -> Self {
+        let mut rectangle = Self([[1.0, -1.0]; 2]);
         for (index, &a) in corners.iter().enumerate() {
             if a[2] >= near {
-                add(a);
+                rectangle.add(a);
             }
             for b in [1, 2, 4].map(|axis| index ^ axis).into_iter().filter(|&b| b > index) {
                 let b = corners[b];
                 if (a[2] < near) != (b[2] < near) {
                     let part = (near - a[2]) / (b[2] - a[2]);
-                    add(std::array::from_fn(|i| a[i] + part * (b[i] - a[i])));
+                    rectangle.add(std::array::from_fn(|i| a[i] + part * (b[i] - a[i])));
                 }
             }
         }
-        rectangle.iter().map(|[from, to]| ((to - from) / 2.0).max(0.0)).product()
+        rectangle
+    }
+
+    fn add(&mut self, [x, y, depth]: [f64; 3]) {
+        for (side, at) in self.0.iter_mut().zip([x / depth, y / depth]) {
+            *side = [side[0].min(at.max(-1.0)), side[1].max(at.min(1.0))];
+        }
+    }
+
+    /// How much of the picture it is, 0 to 1.
+    fn part(&self) -> f64 {
+        self.0.iter().map(|[from, to]| ((to - from) / 2.0).max(0.0)).product()
     }
 }
 

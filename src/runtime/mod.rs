@@ -12,7 +12,7 @@ pub(crate) mod test_tree;
 mod toggles;
 mod tree;
 
-pub use covered::covered;
+pub use covered::{Covered, covered};
 pub use policy::{FrameOutcome, Policy, Residents, Selection};
 pub use toggles::{ToggleCounter, Toggles};
 pub use tree::{SceneTree, TreeNode};

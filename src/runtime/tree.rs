@@ -1,4 +1,9 @@
-//! The hierarchy as selection needs it: few fields a node, children side by side.
+//! The hierarchy as selection needs it: few fields a node, breadth-first.
+//!
+//! Selection goes down from the roots to some level. Written breadth-first, what it visits stands
+//! at the beginning, siblings side by side: however much there is below, it touches the same
+//! memory. A scene's own order is depth-first, in which the nodes visited lie the further apart
+//! the more there is below them.
 
 use std::ops::Range;
 
@@ -25,27 +30,37 @@ pub struct TreeNode {
     pub level: u32,
     /// The coarser node, unless this is a root.
     pub parent: Option<u32>,
-    children: Range<u32>,
+    /// The places of the finer nodes that together show the same piece.
+    pub children: Range<u32>,
 }
 
 /// The hierarchy as selection needs it.
+///
+/// Nodes are known by their index in the scene; their *places* are breadth-first, roots first.
 #[derive(Clone, Debug)]
 pub struct SceneTree {
+    /// By place.
     nodes: Vec<TreeNode>,
-    /// Children of all nodes, those of one side by side.
-    children: Vec<u32>,
-    roots: Vec<u32>,
+    /// By place: index in the scene.
+    indices: Vec<u32>,
+    /// By index in the scene: place.
+    places: Vec<u32>,
+    roots: u32,
     bounds: [DVec3; 2],
 }
 
 impl SceneTree {
     /// The hierarchy of a scene that was [checked](Scene::check).
     pub fn new(scene: &Scene) -> Self {
-        let mut children = Vec::with_capacity(scene.nodes.len());
+        let mut indices: Vec<u32> = scene.roots().collect();
+        let roots = indices.len() as u32;
         let mut nodes = Vec::with_capacity(scene.nodes.len());
-        for (node, index) in scene.nodes.iter().zip(0..) {
-            let first = children.len() as u32;
-            children.extend(scene.children(index));
+        let mut places = vec![0; scene.nodes.len()];
+        while let Some(&index) = indices.get(nodes.len()) {
+            let node = &scene.nodes[index as usize];
+            places[index as usize] = nodes.len() as u32;
+            let first = indices.len() as u32;
+            indices.extend(scene.children(index));
             nodes.push(TreeNode {
                 bbox: [node.bbox_min.into(), node.bbox_max.into()],
                 cost: node.cost,
@@ -55,17 +70,18 @@ impl SceneTree {
                 triangles: node.triangles,
                 level: node.level,
                 parent: node.parent,
-                children: first..children.len() as u32,
+                children: first..indices.len() as u32,
             });
         }
         let bounds = scene.bounds().unwrap_or_default().map(DVec3::from);
-        Self { nodes, children, roots: scene.roots().collect(), bounds }
+        Self { nodes, indices, places, roots, bounds }
     }
 
     /// Computes costs anew (eq. 3.1) with another `c_textured` than that of the build: how much
     /// more a textured triangle costs than another depends on what draws.
     pub fn with_textured_weight(mut self, scene: &Scene, textured_weight: f64) -> Self {
-        for (node, entry) in self.nodes.iter_mut().zip(&scene.nodes) {
+        for (node, &index) in self.nodes.iter_mut().zip(&self.indices) {
+            let entry = &scene.nodes[index as usize];
             let textured = f64::from(entry.textured_triangles);
             let untextured = f64::from(entry.triangles) - textured;
             node.cost = textured * textured_weight + untextured * (1.0 - textured_weight);
@@ -83,20 +99,30 @@ impl SceneTree {
         self.nodes.is_empty()
     }
 
-    /// One node.
+    /// One node, by its index in the scene.
     pub fn node(&self, index: u32) -> &TreeNode {
-        &self.nodes[index as usize]
+        &self.nodes[self.places[index as usize] as usize]
     }
 
     /// The finer nodes that together show the same piece.
     pub fn children(&self, index: u32) -> &[u32] {
-        let range = &self.node(index).children;
-        &self.children[range.start as usize..range.end as usize]
+        self.at(self.node(index).children.clone()).0
     }
 
     /// The nodes without parent.
     pub fn roots(&self) -> &[u32] {
-        &self.roots
+        self.at(self.root_places()).0
+    }
+
+    /// The places of the nodes without parent.
+    pub fn root_places(&self) -> Range<u32> {
+        0..self.roots
+    }
+
+    /// The nodes at some places: their indices in the scene, and themselves.
+    pub fn at(&self, places: Range<u32>) -> (&[u32], &[TreeNode]) {
+        let places = places.start as usize..places.end as usize;
+        (&self.indices[places.clone()], &self.nodes[places])
     }
 
     /// Length of the diagonal of the box around everything, metres.
@@ -107,5 +133,28 @@ impl SceneTree {
     /// The middle of that box.
     pub fn middle(&self) -> DVec3 {
         (self.bounds[0] + self.bounds[1]) / 2.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::runtime::test_tree::{sketch, tree};
+
+    #[test]
+    fn places_are_breadth_first_and_indices_those_of_the_scene() {
+        let leaf = |x: f64| sketch([x, 0.0, 0.0], 1.0, vec![]);
+        let pair = |x: f64| sketch([x, 0.0, 0.0], 1.0, vec![leaf(x + 1.0), leaf(x + 2.0)]);
+        // 0 (1 (2 3) 4) 5 (6 7)
+        let first = sketch([0.0; 3], 1.0, vec![pair(1.0), leaf(4.0)]);
+        let tree = tree(vec![first, pair(5.0)]);
+        assert_eq!((tree.len(), tree.roots()), (8, &[0, 5][..]));
+        assert_eq!(tree.at(0..8).0, [0, 5, 1, 4, 6, 7, 2, 3]);
+        for index in 0..8 {
+            assert_eq!((tree.node(index).bbox[0].x + 1.0) as u32, index);
+            for &child in tree.children(index) {
+                assert_eq!(tree.node(child).parent, Some(index));
+            }
+        }
+        assert_eq!([0, 1, 4, 5].map(|node| tree.children(node).len()), [2, 2, 0, 2]);
     }
 }

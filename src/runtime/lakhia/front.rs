@@ -1,13 +1,14 @@
 //! The traversal: from priorities to time slices, to counters, to the front (thesis, section 4.2).
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
 use super::LakhiaOptions;
 use super::benefit::{Seen, seen};
 use super::feedback::{Feedback, Outlook};
 use super::hysteresis::Hysteresis;
 use crate::camera::View;
-use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection, covered};
+use crate::runtime::{Covered, FrameOutcome, Policy, Residents, SceneTree, Selection, TreeNode};
 
 /// The policy of Lakhia's thesis.
 #[derive(Clone, Debug)]
@@ -18,7 +19,7 @@ pub struct Lakhia {
     /// Cost of the front that was chosen last.
     cost: f64,
     /// The part of the picture that it covers, 0 to 1.
-    covered: f64,
+    covered: Covered,
     /// What its siblings would do to later frames.
     outlook: Outlook,
     /// Milliseconds of this frame that nodes met for the first time may still take.
@@ -36,25 +37,32 @@ const COMING: f64 = 3000.0;
 const GOING: f64 = 10_000.0;
 
 /// Nodes that are drawn together or not at all.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Siblings {
-    /// Drawn where they are not; `None` for the roots.
+    /// Their places in the tree.
+    places: Range<u32>,
+    /// The place of the node that is drawn where they are not; `None` for the roots.
     parent: Option<u32>,
     /// `shareTime`, milliseconds.
     share_ms: f64,
 }
 
-/// What the counters of siblings say.
-#[derive(Clone, Copy, Debug)]
-struct Counted {
-    /// `cumHyst` is not below 0.
-    allowed: bool,
-    /// Milliseconds that all siblings in view need.
+/// What the siblings at hand come to.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    /// Of the priorities of those in view.
+    priority: f64,
+    /// Number of those in view.
+    visible: usize,
+    /// Milliseconds that all of these need.
     needed_ms: f64,
-    /// It will not be within [`COMING`] frames, if nothing changes.
-    rising: bool,
-    /// It will be within [`GOING`] frames, if nothing changes.
-    falling: bool,
+}
+
+impl Sums {
+    /// `priority / Σ priority` (eq. 4.1); equal parts where none of the siblings matters at all.
+    fn share(&self, priority: f64) -> f64 {
+        if self.priority > 0.0 { priority / self.priority } else { 1.0 / self.visible as f64 }
+    }
 }
 
 impl Lakhia {
@@ -65,7 +73,7 @@ impl Lakhia {
             options,
             hysteresis: Hysteresis::default(),
             cost: 0.0,
-            covered: 0.0,
+            covered: Covered::default(),
             outlook: Outlook::NONE,
             room_ms: 0.0,
             queue: VecDeque::new(),
@@ -83,116 +91,124 @@ impl Lakhia {
         residents: &Residents,
         out: &mut Selection,
     ) {
-        let members = siblings.parent.map_or(tree.roots(), |parent| tree.children(parent));
-        let mut sum = 0.0;
+        let (indices, nodes) = tree.at(siblings.places.clone());
+        let mut sums = Sums::default();
         self.seen.clear();
-        for &node in members {
-            let seen = seen(tree.node(node), view, &self.options);
-            out.priorities.push((node, seen.priority));
+        for node in nodes {
+            let seen = seen(node, view, &self.options);
             if seen.visible {
-                sum += seen.priority;
-            } else {
-                out.culled += 1;
+                sums.priority += seen.priority;
+                sums.visible += 1;
+                sums.needed_ms += self.time_needed(node);
             }
             self.seen.push(seen);
         }
-        let Counted { allowed, needed_ms, rising, falling } =
-            self.update_counters(tree, members, siblings, sum);
-        if let Some(parent) = siblings.parent {
-            let resident = members.iter().zip(&self.seen).all(|(&node, seen)| {
+        out.culled += (nodes.len() - sums.visible) as u32;
+        let priorities = indices.iter().zip(&self.seen).map(|(&node, seen)| (node, seen.priority));
+        out.priorities.extend(priorities);
+        let parent = siblings.parent.map(|place| tree.at(place..place + 1));
+        let parent = parent.map(|(index, node)| (index[0], &node[0]));
+        self.start_counters(&siblings, sums, parent.map(|(_, node)| node));
+        let allowed = self.update_counters(nodes, &siblings, sums);
+        if let Some((index, node)) = parent {
+            let resident = indices.iter().zip(&self.seen).all(|(&node, seen)| {
                 residents.contains(node) || !(seen.visible || self.options.all_siblings)
             });
-            let more_ms = needed_ms - self.time_needed(tree, parent);
-            match (resident, allowed) {
-                (true, true) => self.outlook.accepted(more_ms, falling),
-                (true, false) => self.outlook.refused(more_ms, rising),
-                (false, _) => {}
+            if resident {
+                let more_ms = sums.needed_ms - self.time_needed(node);
+                if allowed {
+                    let falling = self.counted_in(GOING, nodes, &siblings, sums) < 0.0;
+                    self.outlook.accepted(more_ms, falling);
+                } else {
+                    let rising = self.counted_in(COMING, nodes, &siblings, sums) >= 0.0;
+                    self.outlook.refused(more_ms, rising);
+                }
             }
             if !(resident && allowed) {
-                return self.draw(tree, parent, out);
+                return self.draw(index, node, view, out);
             }
         }
         // Roots have no parent that could stand for them: far ones that need more than their
         // share do not keep the near ones from going on.
-        let visible_count = self.seen.iter().filter(|seen| seen.visible).count();
-        for (index, &node) in members.iter().enumerate() {
-            let Seen { visible, priority } = self.seen[index];
+        for (at, (&index, node)) in indices.iter().zip(nodes).enumerate() {
+            let Seen { visible, priority } = self.seen[at];
             // A root whose file is broken is not there; others come this far only when they are.
-            if !visible || !(siblings.parent.is_some() || residents.contains(node)) {
+            if !visible || !(parent.is_some() || residents.contains(index)) {
                 continue;
             }
-            if tree.children(node).is_empty() {
-                self.draw(tree, node, out);
+            if node.children.is_empty() {
+                self.draw(index, node, view, out);
             } else {
-                let share_ms = siblings.share_ms * share(priority, sum, visible_count);
-                self.queue.push_back(Siblings { parent: Some(node), share_ms });
+                self.queue.push_back(Siblings {
+                    places: node.children.clone(),
+                    parent: Some(siblings.places.start + at as u32),
+                    share_ms: siblings.share_ms * sums.share(priority),
+                });
             }
         }
     }
 
-    /// Time slices (eq. 4.1) against the time needed.
-    fn update_counters(
-        &mut self,
-        tree: &SceneTree,
-        members: &[u32],
-        siblings: Siblings,
-        sum: f64,
-    ) -> Counted {
-        let share_ms = siblings.share_ms;
-        let visible = || members.iter().zip(&self.seen).filter(|(_, seen)| seen.visible);
-        let time_needed = |node: u32| self.time_needed(tree, node);
-        let count = visible().count();
-        let needed_ms = visible().map(|(&node, _)| time_needed(node)).sum::<f64>();
-        if visible().any(|(&node, _)| self.hysteresis.is_new(node)) {
-            let parent_ms = siblings.parent.map_or(0.0, time_needed);
-            let affordable = share_ms > needed_ms && needed_ms - parent_ms <= self.room_ms;
-            if affordable {
-                self.room_ms -= (needed_ms - parent_ms).max(0.0);
-            }
-            for (&node, _) in members.iter().zip(&self.seen).filter(|(_, seen)| seen.visible) {
-                if self.hysteresis.is_new(node) {
-                    self.hysteresis.start(node, affordable, &self.options);
-                }
+    /// Begins the counters of siblings that are in view for the first time.
+    fn start_counters(&mut self, siblings: &Siblings, sums: Sums, parent: Option<&TreeNode>) {
+        let is_new = |place: u32, seen: &Seen| seen.visible && self.hysteresis.is_new(place);
+        if !siblings.places.clone().zip(&self.seen).any(|(place, seen)| is_new(place, seen)) {
+            return;
+        }
+        let more_ms = sums.needed_ms - parent.map_or(0.0, |parent| self.time_needed(parent));
+        let affordable = siblings.share_ms > sums.needed_ms && more_ms <= self.room_ms;
+        if affordable {
+            self.room_ms -= more_ms.max(0.0);
+        }
+        for (place, seen) in siblings.places.clone().zip(&self.seen) {
+            if seen.visible && self.hysteresis.is_new(place) {
+                self.hysteresis.start(place, affordable, &self.options);
             }
         }
-        let (mut cumulative, mut coming, mut going) = (0.0, 0.0, 0.0);
-        for (&node, seen) in members.iter().zip(&self.seen).filter(|(_, seen)| seen.visible) {
-            let time_slice = share_ms * share(seen.priority, sum, count);
-            let time_needed = self.time_needed(tree, node);
-            self.hysteresis.update(node, time_slice, time_needed, self.options.hyst_limit);
-            cumulative += self.hysteresis.truncated(node, 0.0, &self.options);
-            let urgency = time_slice / time_needed - 1.0;
-            coming += self.hysteresis.truncated(node, urgency * COMING, &self.options);
-            going += self.hysteresis.truncated(node, urgency * GOING, &self.options);
+    }
+
+    /// Time slices (eq. 4.1) against the time needed; true where `cumHyst` is not below 0.
+    fn update_counters(&mut self, nodes: &[TreeNode], siblings: &Siblings, sums: Sums) -> bool {
+        let mut cumulative = 0.0;
+        for ((place, node), seen) in siblings.places.clone().zip(nodes).zip(&self.seen) {
+            if seen.visible {
+                let time_slice = siblings.share_ms * sums.share(seen.priority);
+                let time_needed = self.time_needed(node);
+                self.hysteresis.update(place, time_slice, time_needed, self.options.hyst_limit);
+                cumulative += self.hysteresis.truncated(place, 0.0, &self.options);
+            }
         }
-        Counted {
-            allowed: cumulative >= 0.0,
-            needed_ms,
-            rising: coming >= 0.0,
-            falling: going < 0.0,
+        cumulative >= 0.0
+    }
+
+    /// `cumHyst` so many frames from now, if nothing else changes.
+    fn counted_in(&self, frames: f64, nodes: &[TreeNode], siblings: &Siblings, sums: Sums) -> f64 {
+        let mut cumulative = 0.0;
+        for ((place, node), seen) in siblings.places.clone().zip(nodes).zip(&self.seen) {
+            if seen.visible {
+                let time_slice = siblings.share_ms * sums.share(seen.priority);
+                let urgency = time_slice / self.time_needed(node) - 1.0;
+                cumulative += self.hysteresis.truncated(place, urgency * frames, &self.options);
+            }
         }
+        cumulative
     }
 
     /// `timeNeeded = v_time × cost`, milliseconds.
-    fn time_needed(&self, tree: &SceneTree, node: u32) -> f64 {
-        self.feedback.v_time * tree.node(node).cost
+    fn time_needed(&self, node: &TreeNode) -> f64 {
+        self.feedback.v_time * node.cost
     }
 
-    fn draw(&mut self, tree: &SceneTree, node: u32, out: &mut Selection) {
-        self.cost += tree.node(node).cost;
-        out.front.push(node);
+    fn draw(&mut self, index: u32, node: &TreeNode, view: &View, out: &mut Selection) {
+        self.cost += node.cost;
+        self.covered.add(node.bbox, view);
+        out.front.push(index);
     }
 
     /// What the frame takes beside the fixed overhead, in units of cost: its nodes, and filling
     /// the part of the picture that they cover, which no choice of level changes.
     fn load(&self) -> f64 {
-        self.cost + self.options.time.fill_cost * self.covered
+        self.cost + self.options.time.fill_cost * self.covered.part()
     }
-}
-
-/// `priority / Σ priority` (eq. 4.1); equal parts where none of the siblings matters at all.
-fn share(priority: f64, sum: f64, count: usize) -> f64 {
-    if sum > 0.0 { priority / sum } else { 1.0 / count as f64 }
 }
 
 impl Policy for Lakhia {
@@ -211,16 +227,19 @@ impl Policy for Lakhia {
         self.hysteresis.resize(tree.len());
         let before_ms = self.feedback.fixed_ms + self.feedback.v_time * self.load();
         self.room_ms = self.options.target_ms - before_ms;
-        (self.cost, self.outlook) = (0.0, Outlook::NONE);
+        (self.cost, self.covered, self.outlook) = (0.0, Covered::default(), Outlook::NONE);
         self.queue.clear();
-        self.queue.push_back(Siblings { parent: None, share_ms: self.feedback.share_ms });
+        self.queue.push_back(Siblings {
+            places: tree.root_places(),
+            parent: None,
+            share_ms: self.feedback.share_ms,
+        });
         // First in, first out: all siblings come before the children of any.
         while let Some(siblings) = self.queue.pop_front() {
             self.visit(tree, siblings, view, residents, out);
         }
-        self.covered = covered(tree, &out.front, view);
         let time = &self.options.time;
-        out.covered = self.covered;
+        out.covered = self.covered.part();
         out.v_time = self.feedback.v_time;
         out.share_ms = self.feedback.share_ms;
         out.estimated_ms = self.feedback.fixed_ms + self.feedback.v_time * self.load();
