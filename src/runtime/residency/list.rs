@@ -14,11 +14,8 @@ const NONE: u32 = u32::MAX;
 /// Nodes of equal priority stand in order of their numbers.
 #[derive(Clone, Debug)]
 pub struct PriorityList {
-    before: Vec<u32>,
-    after: Vec<u32>,
-    priority: Vec<f64>,
-    listed: Vec<bool>,
-    loaded: Vec<bool>,
+    /// By node.
+    entries: Vec<Entry>,
     head: u32,
     tail: u32,
     len: usize,
@@ -28,21 +25,40 @@ pub struct PriorityList {
     moves: u64,
 }
 
+/// What the list knows of a node, in one place: neighbours are anywhere in memory.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    priority: f64,
+    before: u32,
+    after: u32,
+    listed: bool,
+    loaded: bool,
+}
+
+impl Entry {
+    const UNLISTED: Self =
+        Self { priority: 0.0, before: NONE, after: NONE, listed: false, loaded: false };
+}
+
 impl PriorityList {
     /// An empty list for nodes `0..nodes`.
     pub fn new(nodes: usize) -> Self {
         Self {
-            before: vec![NONE; nodes],
-            after: vec![NONE; nodes],
-            priority: vec![0.0; nodes],
-            listed: vec![false; nodes],
-            loaded: vec![false; nodes],
+            entries: vec![Entry::UNLISTED; nodes],
             head: NONE,
             tail: NONE,
             len: 0,
             first_unloaded: NONE,
             moves: 0,
         }
+    }
+
+    fn at(&self, node: u32) -> &Entry {
+        &self.entries[node as usize]
+    }
+
+    fn at_mut(&mut self, node: u32) -> &mut Entry {
+        &mut self.entries[node as usize]
     }
 
     /// Number of nodes in the list.
@@ -57,12 +73,12 @@ impl PriorityList {
 
     /// Whether a node is in the list.
     pub fn contains(&self, node: u32) -> bool {
-        self.listed[node as usize]
+        self.at(node).listed
     }
 
     /// The priority that a node was given last.
     pub fn priority(&self, node: u32) -> f64 {
-        self.priority[node as usize]
+        self.at(node).priority
     }
 
     /// The most important node.
@@ -77,12 +93,12 @@ impl PriorityList {
 
     /// The node after this one.
     pub fn after(&self, node: u32) -> Option<u32> {
-        some(self.after[node as usize])
+        some(self.at(node).after)
     }
 
     /// The node before this one.
     pub fn before(&self, node: u32) -> Option<u32> {
-        some(self.before[node as usize])
+        some(self.at(node).before)
     }
 
     /// The most important node that is not loaded, in constant time.
@@ -112,21 +128,21 @@ impl PriorityList {
     /// Gives one node its priority.
     pub fn set(&mut self, node: u32, priority: f64) {
         if !self.contains(node) {
-            self.priority[node as usize] = priority;
+            self.at_mut(node).priority = priority;
             // Most nodes that are met for the first time belong to the end.
             let place = self.upwards(node, self.tail);
             self.link(node, place);
         } else if priority > self.priority(node) {
-            self.priority[node as usize] = priority;
-            let above = self.before[node as usize];
+            self.at_mut(node).priority = priority;
+            let above = self.at(node).before;
             if above != NONE && self.precedes(node, above) {
                 self.unlink(node);
                 let place = self.upwards(node, above);
                 self.link(node, place);
             }
         } else if priority < self.priority(node) {
-            self.priority[node as usize] = priority;
-            let below = self.after[node as usize];
+            self.at_mut(node).priority = priority;
+            let below = self.at(node).after;
             if below != NONE && self.precedes(below, node) {
                 self.unlink(node);
                 let place = self.downwards(node, below);
@@ -144,17 +160,17 @@ impl PriorityList {
 
     /// Says whether a node is loaded; it need not be in the list.
     pub fn set_loaded(&mut self, node: u32, loaded: bool) {
-        if self.loaded[node as usize] == loaded {
+        if self.at(node).loaded == loaded {
             return;
         }
-        self.loaded[node as usize] = loaded;
+        self.at_mut(node).loaded = loaded;
         if !self.contains(node) {
             return;
         }
         if !loaded {
             self.offer(node);
         } else if self.first_unloaded == node {
-            self.first_unloaded = self.next_unloaded(self.after[node as usize]);
+            self.first_unloaded = self.next_unloaded(self.at(node).after);
         }
     }
 
@@ -166,8 +182,8 @@ impl PriorityList {
     /// The first node that is not loaded, from this one on.
     fn next_unloaded(&mut self, from: u32) -> u32 {
         let mut at = from;
-        while at != NONE && self.loaded[at as usize] {
-            at = self.after[at as usize];
+        while at != NONE && self.at(at).loaded {
+            at = self.at(at).after;
             self.moves += 1;
         }
         at
@@ -189,7 +205,7 @@ impl PriorityList {
     fn upwards(&mut self, node: u32, start: u32) -> u32 {
         let mut at = start;
         while at != NONE && self.precedes(node, at) {
-            at = self.before[at as usize];
+            at = self.at(at).before;
             self.moves += 1;
         }
         at
@@ -199,7 +215,7 @@ impl PriorityList {
     fn downwards(&mut self, node: u32, start: u32) -> u32 {
         let mut at = start;
         loop {
-            let next = self.after[at as usize];
+            let next = self.at(at).after;
             self.moves += 1;
             if next == NONE || self.precedes(node, next) {
                 return at;
@@ -210,23 +226,23 @@ impl PriorityList {
 
     /// Puts a node behind another, or at the head.
     fn link(&mut self, node: u32, behind: u32) {
-        let next = if behind == NONE { self.head } else { self.after[behind as usize] };
-        self.before[node as usize] = behind;
-        self.after[node as usize] = next;
+        let next = if behind == NONE { self.head } else { self.at(behind).after };
+        self.at_mut(node).before = behind;
+        self.at_mut(node).after = next;
         *self.slot_after(behind) = node;
         *self.slot_before(next) = node;
-        self.listed[node as usize] = true;
+        self.at_mut(node).listed = true;
         self.len += 1;
-        if !self.loaded[node as usize] {
+        if !self.at(node).loaded {
             self.offer(node);
         }
     }
 
     fn unlink(&mut self, node: u32) {
-        let (above, below) = (self.before[node as usize], self.after[node as usize]);
+        let (above, below) = (self.at(node).before, self.at(node).after);
         *self.slot_after(above) = below;
         *self.slot_before(below) = above;
-        self.listed[node as usize] = false;
+        self.at_mut(node).listed = false;
         self.len -= 1;
         if self.first_unloaded == node {
             self.first_unloaded = self.next_unloaded(below);
@@ -234,19 +250,19 @@ impl PriorityList {
     }
 
     fn slot_after(&mut self, node: u32) -> &mut u32 {
-        if node == NONE { &mut self.head } else { &mut self.after[node as usize] }
+        if node == NONE { &mut self.head } else { &mut self.at_mut(node).after }
     }
 
     fn slot_before(&mut self, node: u32) -> &mut u32 {
-        if node == NONE { &mut self.tail } else { &mut self.before[node as usize] }
+        if node == NONE { &mut self.tail } else { &mut self.at_mut(node).before }
     }
 
     fn sort_anew(&mut self, rest: &[(u32, f64)]) {
         let mut nodes: Vec<u32> =
             std::iter::successors(self.first(), |&node| self.after(node)).collect();
         for &(node, priority) in rest {
-            self.priority[node as usize] = priority;
-            if !std::mem::replace(&mut self.listed[node as usize], true) {
+            self.at_mut(node).priority = priority;
+            if !std::mem::replace(&mut self.at_mut(node).listed, true) {
                 nodes.push(node);
             }
         }
@@ -278,13 +294,13 @@ mod tests {
         back.reverse();
         assert_eq!(order, back);
         let mut sorted: Vec<u32> =
-            (0..list.listed.len() as u32).filter(|&node| list.contains(node)).collect();
+            (0..list.entries.len() as u32).filter(|&node| list.contains(node)).collect();
         sorted.sort_by(|&a, &b| {
             list.priority(b).partial_cmp(&list.priority(a)).unwrap().then(a.cmp(&b))
         });
         assert_eq!(order, sorted);
         assert_eq!(list.len(), order.len());
-        let first = order.iter().copied().find(|&node| !list.loaded[node as usize]);
+        let first = order.iter().copied().find(|&node| !list.at(node).loaded);
         assert_eq!(list.first_unloaded(), first);
     }
 

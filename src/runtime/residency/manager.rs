@@ -93,6 +93,8 @@ pub struct Residency {
     /// By node: the last frame in which it was drawn, or its children were visited in its place.
     pub(super) needed: Vec<u64>,
     pub(super) frame: u64,
+    /// Nodes that the last frame visited and that were not resident.
+    missed: Vec<u32>,
     /// Loaded, in the order in which they were.
     arrivals: Vec<u32>,
     /// Leaving.
@@ -127,6 +129,7 @@ impl Residency {
             worth: Worth::new(nodes),
             needed: vec![0; nodes],
             frame: 0,
+            missed: Vec::new(),
             arrivals: Vec::new(),
             leaving: Vec::new(),
             orphans: Vec::new(),
@@ -200,15 +203,10 @@ impl Residency {
         self.resident
     }
 
-    /// Nodes visited in the last frame that are not in memory: how many loads wait.
+    /// Nodes that the last frame visited and found not in memory, and that still are not: how many
+    /// loads wait.
     pub fn waiting(&self) -> usize {
-        let mut count = 0;
-        let mut at = self.list.first_unloaded();
-        while let Some(node) = at {
-            count += usize::from(self.wants(node));
-            at = self.list.after(node);
-        }
-        count
+        self.missed.iter().filter(|&&node| self.wants(node)).count()
     }
 
     /// What has happened so far.
@@ -227,8 +225,12 @@ impl Residency {
     /// Takes the priorities of a frame: of the nodes visited, and of some others.
     pub fn set_priorities(&mut self, visited: &[(u32, f64)], others: &[(u32, f64)]) {
         self.frame += 1;
+        self.missed.clear();
         for &(node, _) in visited {
             self.visited[node as usize] = self.frame;
+            if self.states[node as usize] != NodeState::Resident {
+                self.missed.push(node);
+            }
             if let Some(parent) = self.parents[node as usize] {
                 self.needed[parent as usize] = self.frame;
             }
@@ -252,7 +254,7 @@ impl Residency {
     pub fn stale(&mut self, count: usize, out: &mut Vec<u32>) {
         out.clear();
         for _ in 0..(8 * count).min(self.states.len()) {
-            self.cursor = (self.cursor + 1) % self.states.len();
+            self.cursor = if self.cursor + 1 < self.states.len() { self.cursor + 1 } else { 0 };
             let held = self.states[self.cursor] == NodeState::Resident;
             if held && self.visited[self.cursor] != self.frame {
                 out.push(self.cursor as u32);
