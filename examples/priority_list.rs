@@ -3,7 +3,8 @@
 //!
 //! Each frame gives all nodes their new priorities and asks for the most important one that is not
 //! loaded, which then counts as loaded; the least important one is given up for it. The heap is
-//! the standard library's, with entries that are out of date skipped when they come up.
+//! the standard library's, with entries that are out of date skipped when they come up. The two
+//! take turns, and the shortest of their turns counts.
 
 use std::collections::BinaryHeap;
 use std::hint::black_box;
@@ -12,6 +13,7 @@ use std::time::Instant;
 use hlod::runtime::residency::PriorityList;
 
 const FRAMES: u32 = 2000;
+const ROUNDS: usize = 3;
 
 /// Priority of a node on a long street for a camera that walks 5 cm a frame, seen as from 1 m at
 /// least.
@@ -73,9 +75,12 @@ fn with_heap(nodes: u32) -> (Vec<u32>, f64) {
 fn main() {
     println!("{:>8} {:>10} {:>10}   ns for each update", "nodes", "list", "heap");
     for nodes in [300, 3_000, 30_000] {
-        let (by_list, list_ns) = with_list(nodes);
-        let (by_heap, heap_ns) = with_heap(nodes);
-        assert_eq!(by_list, by_heap, "the two disagree");
+        let (mut list_ns, mut heap_ns) = (f64::INFINITY, f64::INFINITY);
+        for _ in 0..ROUNDS {
+            let ((by_list, of_list), (by_heap, of_heap)) = (with_list(nodes), with_heap(nodes));
+            assert_eq!(by_list, by_heap, "the two disagree");
+            (list_ns, heap_ns) = (list_ns.min(of_list), heap_ns.min(of_heap));
+        }
         println!("{nodes:>8} {list_ns:>10.1} {heap_ns:>10.1}");
     }
 }

@@ -14,7 +14,7 @@ def columns(programs, example):
 
 
 def main():
-    programs = Programs(examples=["selection_time", "priority_list"])
+    programs = Programs(examples=["selection_time", "priority_list"], bins=False)
     selection = table(
         ["nodes of the scene", "visited", "drawn", "ms a frame"],
         columns(programs, "selection_time"),

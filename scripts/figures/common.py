@@ -18,8 +18,9 @@ DATA = Path(os.environ.get("HLOD_DATA", ROOT.parent / "shared" / "data"))
 class Programs:
     """The programs in their release build, and a folder for what they make."""
 
-    def __init__(self, examples=(), features=False):
-        command = ["cargo", "build", "--release", "--locked", "--bins"]
+    def __init__(self, examples=(), features=False, bins=True):
+        command = ["cargo", "build", "--release", "--locked"]
+        command += ["--bins"] if bins else []
         command += [] if features else ["--no-default-features"]
         command += [part for name in examples for part in ("--example", name)]
         subprocess.run(command, cwd=ROOT, check=True)
