@@ -18,6 +18,7 @@ pub mod render;
 pub mod report;
 pub mod runtime;
 pub mod texture;
+pub mod verify;
 
 mod random;
 

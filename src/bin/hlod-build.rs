@@ -16,8 +16,12 @@ use hlod::build::{BuildOptions, Outcome, build};
 use hlod::format::Scene;
 use hlod::mesh::UpAxis;
 use hlod::report::{build_summary, inspect};
+use hlod::verify::{self, VerifyOptions, verify};
 use hlod::{Error, Result};
 use indicatif::{HumanCount, ProgressBar, ProgressStyle};
+
+/// The exit code of a verification that found a fault: the scene is no valid input.
+const NOT_HELD: u8 = 3;
 
 /// Turns city meshes into a hierarchy of levels of detail.
 ///
@@ -30,8 +34,8 @@ use indicatif::{HumanCount, ProgressBar, ProgressStyle};
     version,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    override_usage = "hlod-build [OPTIONS] INPUT... OUT\n       hlod-build inspect [--json] OUT",
-    after_help = "Examples:\n  hlod-build city.obj out/\n  hlod-build --blocks grid:200 tiles/ more.glb out/\n  hlod-build inspect out/\n\nExit codes: 0 success, 1 internal error, 2 usage, 3 input missing or invalid, 4 output not written."
+    override_usage = "hlod-build [OPTIONS] INPUT... OUT\n       hlod-build inspect [--json] OUT\n       hlod-build verify [--json] [--source MODEL]... OUT",
+    after_help = "Examples:\n  hlod-build city.obj out/\n  hlod-build --blocks grid:200 tiles/ more.glb out/\n  hlod-build inspect out/\n  hlod-build verify out/ --source city.obj\n\nExit codes: 0 success, 1 internal error, 2 usage, 3 input missing or invalid, or what verify looked at does not hold, 4 output not written."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -53,6 +57,38 @@ enum Command {
         #[arg(long, value_name = "N", default_value_t = 20)]
         blocks: usize,
     },
+    /// Checks a built hierarchy against its source: files, attributes, distances, gaps, colours.
+    /// Ends in pass or, with exit code 3, in fail
+    Verify(VerifyArgs),
+}
+
+#[derive(Args, Debug)]
+struct VerifyArgs {
+    /// The output folder of an earlier build
+    out: PathBuf,
+    /// The models that it was built from, or folders of them; without any, the leaves stand for
+    /// the source and are not checked themselves
+    #[arg(long, value_name = "MODEL", num_args = 1..)]
+    source: Vec<PathBuf>,
+    /// One JSON object with all figures
+    #[arg(long)]
+    json: bool,
+    /// Points spread over the source by area, 1000 or more, and as many over each level; vertices
+    /// are measured besides. More: rarer faults are found, and it takes longer
+    #[arg(long, value_name = "N", default_value_t = 300_000)]
+    samples: u64,
+    /// Draws the points: the same figures for the same seed
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Worst nodes to list
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    worst: usize,
+    /// Threads, 0-1024; 0 is one for each core. The result does not depend on it
+    #[arg(long, short = 'j', value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Show no progress
+    #[arg(long, short)]
+    quiet: bool,
 }
 
 #[derive(Args, Debug)]
@@ -170,10 +206,15 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match cli.command {
         Some(Command::Inspect { out, json, blocks }) => inspect_scene(&out, json, blocks),
+        Some(Command::Verify(arguments)) => return verify_scene(&arguments),
         None => run(&cli.build),
     };
+    exit_code(done.map(|()| ExitCode::SUCCESS))
+}
+
+fn exit_code(done: Result<ExitCode>) -> ExitCode {
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             eprintln!("hlod-build: {error}");
             ExitCode::from(error.exit_code())
@@ -208,6 +249,24 @@ fn inspect_scene(out: &Path, json: bool, blocks: usize) -> Result<()> {
     })
 }
 
+fn verify_scene(arguments: &VerifyArgs) -> ExitCode {
+    let options = VerifyOptions {
+        samples: arguments.samples,
+        seed: arguments.seed,
+        worst: arguments.worst,
+        ..Default::default()
+    };
+    let bar = PhaseBar::new(arguments.quiet);
+    let verified = with_threads(arguments.threads, || {
+        verify(&arguments.out, &arguments.source, &options, &bar)
+    });
+    bar.0.finish_and_clear();
+    exit_code(verified.and_then(|verified| verified).and_then(|report| {
+        print(&if arguments.json { report.to_json()? } else { verify::text(&report) })?;
+        Ok(if report.passed { ExitCode::SUCCESS } else { ExitCode::from(NOT_HELD) })
+    }))
+}
+
 /// To standard output; that nobody reads on (`| head`) is no error.
 fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
@@ -215,6 +274,27 @@ fn print(text: &str) -> Result<()> {
             Err(Error::output("standard output", error.to_string()))
         }
         _ => Ok(()),
+    }
+}
+
+/// The phases of a verification on a terminal; nothing elsewhere.
+struct PhaseBar(ProgressBar);
+
+impl PhaseBar {
+    fn new(quiet: bool) -> Self {
+        Self(bar(quiet, "{msg:24} {wide_bar} {percent:>3} %  {eta} left"))
+    }
+}
+
+impl verify::Progress for PhaseBar {
+    fn phase(&self, name: &str, steps: u64) {
+        self.0.reset();
+        self.0.set_length(steps);
+        self.0.set_message(name.to_owned());
+    }
+
+    fn done(&self, steps: u64) {
+        self.0.inc(steps);
     }
 }
 
@@ -226,27 +306,28 @@ struct Bar {
 
 impl Bar {
     fn new(quiet: bool) -> Self {
-        let bar = if quiet || !std::io::stderr().is_terminal() {
-            ProgressBar::hidden()
-        } else {
-            let bar = ProgressBar::new(0);
-            let style = ProgressStyle::with_template(
-                "{msg:24} {wide_bar} {percent:>3} %  {rate}  {eta} left",
-            );
-            if let Ok(style) = style {
-                bar.set_style(style.with_key(
-                    "rate",
-                    |state: &indicatif::ProgressState, out: &mut dyn std::fmt::Write| {
-                        let rate = HumanCount(state.per_sec() as u64);
-                        let _ = write!(out, "{rate} triangles/s");
-                    },
-                ));
-            }
-            bar.enable_steady_tick(Duration::from_millis(200));
-            bar
-        };
+        let bar = bar(quiet, "{msg:24} {wide_bar} {percent:>3} %  {rate}  {eta} left");
         Self { bar, found: AtomicU64::new(0) }
     }
+}
+
+/// A bar on a terminal that is not to be quiet.
+fn bar(quiet: bool, template: &str) -> ProgressBar {
+    if quiet || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(0);
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style.with_key(
+            "rate",
+            |state: &indicatif::ProgressState, out: &mut dyn std::fmt::Write| {
+                let rate = HumanCount(state.per_sec() as u64);
+                let _ = write!(out, "{rate} triangles/s");
+            },
+        ));
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
 }
 
 impl Progress for Bar {

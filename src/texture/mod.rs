@@ -16,7 +16,7 @@ mod bits;
 mod block;
 mod cache;
 mod charts;
-mod encode;
+pub(crate) mod encode;
 mod fill;
 mod islands;
 mod level;

@@ -1,0 +1,192 @@
+//! How levels look beside the source: colours at the same points.
+
+use rayon::prelude::*;
+
+use super::distance::LevelDistances;
+use super::geometry::NodeGeometry;
+use super::look::{Color, squared_difference};
+use super::node_look::{NodePictures, NodePoint};
+use super::options::Limits;
+use super::points::Points;
+use super::report::{Check, LeafFigures, TileFigures};
+use super::source_colors::Shown;
+use super::tiles::{Tile, count};
+use super::tree::is_leaf;
+use crate::format::Scene;
+
+/// Fewer samples of a leaf than this say nothing of it.
+const FEWEST: u64 = 12;
+
+/// What the source shows at each point.
+pub(super) struct Reference {
+    /// Its colour; `None` where there is none to compare.
+    pub color: Vec<Option<Color>>,
+    /// Its tile; empty where the source has none.
+    pub tile: Vec<Option<Tile>>,
+}
+
+/// Colours of the leaves at all points.
+pub(super) fn leaf_colors(
+    leaves: &[u32],
+    points: &Points,
+    pictures: &NodePictures,
+    done: impl Fn() + Sync,
+) -> Vec<Option<Color>> {
+    let colors: Vec<Vec<Option<Color>>> = leaves
+        .par_iter()
+        .enumerate()
+        .map(|(place, &leaf)| {
+            let at: Vec<NodePoint> = points.all[points.of_leaf(place)]
+                .iter()
+                .map(|point| (point.triangle, point.weights))
+                .collect();
+            let colors = if at.is_empty() { Vec::new() } else { pictures.colors(leaf, &at) };
+            done();
+            colors
+        })
+        .collect();
+    colors.into_iter().flatten().collect()
+}
+
+/// Check: the texels of the leaves are the source's, within JPEG's error.
+pub(super) fn texels(
+    scene: &Scene,
+    leaves: &[u32],
+    points: &Points,
+    shown: &[Option<Color>],
+    reference: &[Option<Shown>],
+    figures: &mut LeafFigures,
+    limits: &Limits,
+) -> Check {
+    let mut check = Check::new("texels of the leaves");
+    let jpeg = figures.jpeg_rms.unwrap_or(0.0);
+    let (mut sum, mut compared) = (0.0, 0);
+    for (place, &leaf) in leaves.iter().enumerate() {
+        let (mut squares, mut count) = (0.0, 0);
+        for number in points.of_leaf(place) {
+            if let (Some(color), Some(source)) = (shown[number], reference[number]) {
+                squares += squared_difference(color, source.color);
+                count += 1;
+            }
+        }
+        let rms = if count > 0 { (squares / count as f64).sqrt() } else { 0.0 };
+        let limit = limits.leaf_texel_ratio * jpeg + limits.leaf_texel_slack;
+        if count >= FEWEST && rms > limit {
+            check.fail(
+                &scene.nodes[leaf as usize].file,
+                format!(
+                    "colours are off by {rms:.1} of 255 (RMS of {count} samples), limit {limit:.1}"
+                ),
+                HINT,
+            );
+        }
+        sum += squares;
+        compared += count;
+    }
+    figures.color_samples = compared;
+    figures.color_rms = if compared > 0 { (sum / compared as f64).sqrt() } else { 0.0 };
+    let limit = limits.texel_ratio * jpeg + limits.texel_slack;
+    if figures.color_rms > limit {
+        let what =
+            format!("colours are off by {:.2} of 255 (RMS), limit {limit:.2}", figures.color_rms);
+        check.fail("all leaves", what, HINT);
+    }
+    check.summary = format!(
+        "colours off by {:.2} of 255 (RMS of {compared} samples); JPEG alone: {}",
+        figures.color_rms,
+        figures.jpeg_rms.map_or("no pictures".into(), |rms| format!("{rms:.2}")),
+    );
+    check
+}
+
+const HINT: &str = "build again with --force; a higher --jpeg-quality lowers JPEG's own part";
+
+/// RMS colour difference of a level and its tiles. Points in leaves above the level count with
+/// the leaves' own difference.
+pub(super) fn level(
+    scene: &Scene,
+    distances: &LevelDistances,
+    points: &Points,
+    geometry: &[NodeGeometry],
+    pictures: &NodePictures,
+    leaf_shown: &[Option<Color>],
+    reference: &Reference,
+    done: impl Fn() + Sync,
+) -> (Option<f64>, Option<TileFigures>) {
+    // By node, so that each file is read once; points stay in order within.
+    let mut closest = distances.closest.clone();
+    closest.sort_by_key(|&(number, node, ..)| (node, number));
+    let mut below = vec![false; points.all.len()];
+    closest.iter().for_each(|&(number, ..)| below[number as usize] = true);
+    let groups: Vec<_> = closest.chunk_by(|a, b| a.1 == b.1).collect();
+    let sums: Vec<(f64, u64, TileFigures)> = groups
+        .par_iter()
+        .map(|group| {
+            let node = group[0].1;
+            let at: Vec<NodePoint> =
+                group.iter().map(|&(_, _, triangle, weights)| (triangle, weights)).collect();
+            let colors = pictures.colors(node, &at);
+            let scale = texel_scale(scene, geometry, node);
+            let mut found = (0.0, 0, TileFigures::default());
+            for (&(number, ..), color) in group.iter().zip(colors) {
+                add(&mut found, number as usize, color, scale, reference);
+            }
+            done();
+            found
+        })
+        .collect();
+    let mut all = (0.0, 0, TileFigures::default());
+    for (squares, compared, tiles) in sums {
+        all.0 += squares;
+        all.1 += compared;
+        all.2.samples += tiles.samples;
+        all.2.clear += tiles.clear;
+        all.2.wrong += tiles.wrong;
+        all.2.unreadable += tiles.unreadable;
+    }
+    for (number, _) in below.iter().enumerate().filter(|(_, below)| !**below) {
+        add(&mut all, number, leaf_shown[number], 1.0, reference);
+    }
+    let rms = (all.1 > 0).then(|| (all.0 / all.1 as f64).sqrt());
+    (rms, (!reference.tile.is_empty()).then_some(all.2))
+}
+
+/// Tiles that the leaves show.
+pub(super) fn leaf_tiles(shown: &[Option<Color>], reference: &Reference) -> Option<TileFigures> {
+    let mut found = (0.0, 0, TileFigures::default());
+    for (number, &color) in shown.iter().enumerate() {
+        add(&mut found, number, color, 1.0, reference);
+    }
+    (!reference.tile.is_empty()).then_some(found.2)
+}
+
+fn add(
+    (squares, compared, tiles): &mut (f64, u64, TileFigures),
+    number: usize,
+    color: Option<Color>,
+    scale: f64,
+    reference: &Reference,
+) {
+    let (Some(color), Some(source)) = (color, reference.color[number]) else { return };
+    *squares += squared_difference(color, source);
+    *compared += 1;
+    if let Some(tile) = reference.tile.get(number).copied().flatten() {
+        count(tiles, &tile, color, scale);
+    }
+}
+
+/// The width of a node's texels in texels of the leaves below it, from what both have.
+fn texel_scale(scene: &Scene, geometry: &[NodeGeometry], node: u32) -> f64 {
+    if is_leaf(scene, node) {
+        return 1.0;
+    }
+    let own = scene.nodes[node as usize].texels;
+    let (mut below, mut open) = (0, vec![node]);
+    while let Some(next) = open.pop() {
+        if is_leaf(scene, next) && !geometry[next as usize].triangles.is_empty() {
+            below += scene.nodes[next as usize].texels;
+        }
+        open.extend(scene.children(next));
+    }
+    if own > 0 { (below as f64 / own as f64).sqrt().max(1.0) } else { 1.0 }
+}

@@ -1,0 +1,127 @@
+//! Which triangles of coarse nodes lie in cutting planes: skirts, which cover gaps.
+//!
+//! The format does not say which triangles these are, and need not: a triangle in the plane of a
+//! cut that bounds its node stands across the surface and shows only where levels meet. The source
+//! has no surface there, and skirts promise none: so they are no part of the distances between
+//! surfaces. What they do promise, that nothing shows between two levels, [`super::gaps`] checks.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+
+use super::geometry::NodeGeometry;
+use super::sample::cross;
+use super::seams::Seam;
+use super::tree::{apart, is_leaf};
+use crate::format::{Node, Scene};
+
+/// How far a triangle in a cutting plane may be from it, as a share of its longest edge. A border
+/// vertex may lie beside the plane by a hundredth of the edge that was not split there.
+const BESIDE: f64 = 0.02;
+
+/// Cosine of the angle between its normal and the plane's, at least.
+const FACING: f64 = 0.98;
+
+/// An axis and a coordinate on it, as bits: planes are found by equality.
+type Plane = (usize, u64);
+
+/// Marks the triangles of coarse nodes that lie in a plane at which they were cut.
+pub(super) fn mark(scene: &Scene, geometry: &mut [NodeGeometry], seams: &[Seam], steps: &[f64]) {
+    let mut planes: Vec<BTreeSet<Plane>> = vec![BTreeSet::new(); geometry.len()];
+    let mut pairs: BTreeMap<[u32; 2], Vec<&Seam>> = BTreeMap::new();
+    for seam in seams {
+        pairs.entry(seam.leaves).or_default().push(seam);
+    }
+    for ([a, b], seams) in pairs {
+        let nodes = [a, b].map(|leaf| &scene.nodes[leaf as usize]);
+        if let Some(plane) = plane_between(&seams, nodes, steps[a as usize]) {
+            for node in apart(scene, a, b).concat() {
+                planes[node as usize].insert(plane);
+            }
+        }
+    }
+    geometry.par_iter_mut().enumerate().for_each(|(number, node)| {
+        if is_leaf(scene, number as u32) || planes[number].is_empty() {
+            return;
+        }
+        let planes: Vec<(usize, f64)> =
+            planes[number].iter().map(|&(axis, bits)| (axis, f64::from_bits(bits))).collect();
+        node.in_cut_plane = node
+            .triangles
+            .iter()
+            .map(|&triangle| {
+                let corners = node.corners(triangle);
+                let [a, b, c] = corners;
+                let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+                let beside = 2.0 * steps[number] + BESIDE * longest;
+                let normal = cross(corners);
+                planes.iter().any(|&(axis, coordinate)| {
+                    let across = normal[axis].abs() >= FACING * normal.length();
+                    across
+                        && corners.iter().all(|corner| (corner[axis] - coordinate).abs() <= beside)
+                })
+            })
+            .collect();
+    });
+}
+
+/// The plane that holds most of the edges between two leaves and separates their boxes.
+fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<Plane> {
+    let mut best: Option<(f64, Plane)> = None;
+    for axis in 0..3 {
+        let middle = |node: &Node| (node.bbox_min[axis] + node.bbox_max[axis]) * 0.5;
+        let (low, high) = if middle(a) <= middle(b) { (a, b) } else { (b, a) };
+        let mut counts: BTreeMap<u64, usize> = BTreeMap::new();
+        for seam in seams {
+            let [from, to] = seam.ends.map(|end| end[axis] + 0.0);
+            if from == to {
+                *counts.entry(from.to_bits()).or_default() += 1;
+            }
+        }
+        let Some((&bits, &count)) = counts.iter().max_by_key(|&(_, &count)| count) else {
+            continue;
+        };
+        // Vertices near the plane count as on it, so a few edges lie beside it, and boxes may
+        // overlap by a little. Leaves that are flat along the axis are not cut across it.
+        let coordinate = f64::from_bits(bits);
+        let side = |node: &Node| node.bbox_max[axis] - node.bbox_min[axis];
+        let slack = 4.0 * step + BESIDE * side(a).min(side(b));
+        let between = low.bbox_max[axis] <= coordinate + slack
+            && high.bbox_min[axis] >= coordinate - slack
+            && middle(low) < coordinate - slack
+            && middle(high) > coordinate + slack;
+        let apart = middle(high) - middle(low);
+        if between && 2 * count >= seams.len() && best.is_none_or(|(most, _)| apart > most) {
+            best = Some((apart, (axis, bits)));
+        }
+    }
+    best.map(|(_, plane)| plane)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::test_scene::scene;
+    use glam::DVec3;
+
+    #[test]
+    fn the_plane_is_found_beside_other_coordinates_that_edges_share() {
+        let node = |low: [f64; 3], high: [f64; 3]| Node {
+            bbox_min: low,
+            bbox_max: high,
+            ..scene().nodes[0].clone()
+        };
+        let seam = |from: [f64; 3], to: [f64; 3]| Seam {
+            ends: [DVec3::from(from), DVec3::from(to)],
+            leaves: [0, 1],
+        };
+        let flat = [node([0.0; 3], [5.0, 9.0, 0.0]), node([5.0, 0.0, 0.0], [11.0, 9.0, 0.0])];
+        let seams =
+            [seam([5.0, 0.0, 0.0], [5.0, 4.0, 0.0]), seam([5.0, 4.0, 0.0], [5.0, 9.0, 0.0])];
+        let seams: Vec<&Seam> = seams.iter().collect();
+        let found = plane_between(&seams, [&flat[0], &flat[1]], 1e-6);
+        assert_eq!(found, Some((0, 5f64.to_bits())), "not z = 0, where all is");
+        let beside = seam([5.01, 0.0, 0.0], [5.02, 4.0, 1.0]);
+        assert_eq!(plane_between(&[&beside], [&flat[0], &flat[1]], 1e-6), None);
+    }
+}

@@ -1,0 +1,76 @@
+//! Check: the stored error of a node is honest, not below the measured one, and of use, not far
+//! above it.
+
+use super::distance::NodeDistances;
+use super::options::Limits;
+use super::report::{Check, ErrorFigures};
+use crate::format::Scene;
+
+/// Compares stored and measured errors of all coarse nodes. A lattice `step` each is room for the
+/// rounding of coordinates, and the least that is counted as measured.
+pub(super) fn errors(
+    scene: &Scene,
+    nodes: &[NodeDistances],
+    steps: &[f64],
+    limits: &Limits,
+) -> (Option<ErrorFigures>, Check) {
+    let mut check = Check::new("stored errors");
+    let mut ratios: Vec<f64> = Vec::with_capacity(nodes.len());
+    let mut too_small: Vec<(f64, String, String)> = Vec::new();
+    for measured in nodes {
+        let node = &scene.nodes[measured.node as usize];
+        let step = steps[measured.node as usize];
+        let (stored, max) = (node.geometric_error, measured.max());
+        ratios.push(stored.max(step) / max.max(step));
+        if stored + step < max {
+            let at = if measured.to_front.max() >= measured.to_source.max() {
+                (measured.to_front.farthest(), "the source is", "the front")
+            } else {
+                (measured.to_source.farthest(), "the node is", "the source")
+            };
+            let (place, from, to) = at;
+            let what = format!(
+                "stores {stored:.4} m, but {from} {max:.4} m from {to} at {:.3} {:.3} {:.3}",
+                place.x, place.y, place.z
+            );
+            too_small.push((stored / max, node.file.clone(), what));
+        }
+    }
+    let count = too_small.len() as u64;
+    too_small.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
+    for (_, file, what) in too_small {
+        check.fail(
+            file,
+            what,
+            "use the measured figure, and report this: the builder's bound does not hold",
+        );
+    }
+    ratios.sort_by(f64::total_cmp);
+    let Some(&least_ratio) = ratios.first() else {
+        check.summary = "all nodes are leaves".into();
+        return (None, check);
+    };
+    let at = |share: f64| ratios[((ratios.len() - 1) as f64 * share).round() as usize];
+    let figures = ErrorFigures {
+        nodes: ratios.len() as u64,
+        too_small: count,
+        least_ratio,
+        median_ratio: at(0.5),
+        high_ratio: at(0.95),
+    };
+    if figures.median_ratio > limits.error_ratio {
+        check.fail(
+            "all nodes",
+            format!(
+                "stored errors are {:.2} times the measured ones in the median, limit {}",
+                figures.median_ratio, limits.error_ratio
+            ),
+            "detail is loaded that nobody needs; report this: the builder's bound is too loose",
+        );
+    }
+    check.summary = format!(
+        "stored over measured in {} nodes: least {:.2}, median {:.2}, 95 of 100 below {:.2}; {} too small",
+        figures.nodes, figures.least_ratio, figures.median_ratio, figures.high_ratio, count
+    );
+    (Some(figures), check)
+}

@@ -1,0 +1,160 @@
+//! Check: the leaves together are the source, in area, vertices and surface.
+
+use rayon::prelude::*;
+
+use super::assembly::Assembly;
+use super::geometry::NodeGeometry;
+use super::options::Limits;
+use super::points::Points;
+use super::progress::Progress;
+use super::report::{Check, LeafFigures};
+use super::sample::area;
+use super::source::Source;
+use crate::format::Scene;
+
+/// How far a point of a leaf may be from the source, in steps along each axis: half a step for the
+/// rounding of source vertices, and as much again for each cut on the way to the leaf, since a cut
+/// rounds the vertices that it makes.
+fn leaf_bound(scene: &Scene, leaf: u32) -> f64 {
+    let factor = scene.parameters["level_factor"].as_u64().unwrap_or(4).clamp(2, 64);
+    let cuts_each = factor.next_power_of_two().ilog2();
+    0.5 + 0.5 * f64::from(scene.nodes[leaf as usize].level * cuts_each)
+}
+
+/// Room for the last bits of f64 in coordinates, as a share of a step.
+const LAST_BITS: f64 = 1e-3;
+/// Vertices that one thread looks for in one go.
+const CHUNK: usize = 4096;
+
+const HINT: &str = "verify with the source that the scene was built from, or build again; if it \
+                    stays, this is a fault of the builder";
+
+/// Compares the geometry of all leaves with the source. `steps` are the nodes' lattice steps.
+pub(super) fn faithful(
+    scene: &Scene,
+    source: &Source,
+    leaves: &[u32],
+    geometry: &[NodeGeometry],
+    points: &Points,
+    steps: &[f64],
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> (LeafFigures, Check) {
+    let mut check = Check::new("faithful leaves");
+    let surface = &source.surface;
+    let assembly = Assembly::new(leaves.iter().copied(), geometry);
+    let leaf_steps = || leaves.iter().map(|&leaf| steps[leaf as usize]);
+    // Strays lie on a lattice that may be much coarser; all others are looked for first.
+    let finest = leaf_steps().fold(f64::INFINITY, f64::min);
+    let coarsest = leaf_steps().fold(0.0, f64::max);
+    let mut figures = LeafFigures {
+        source_area: (0..surface.triangles().len() as u32)
+            .map(|triangle| area(surface.corners(triangle)))
+            .sum(),
+        leaf_area: leaves.iter().map(|&leaf| geometry[leaf as usize].area()).sum(),
+        source_vertices: surface.positions().len() as u64,
+        vertex_bound: finest * 0.5 * 3f64.sqrt(),
+        ..LeafFigures::default()
+    };
+    figures.area_difference = (figures.leaf_area / figures.source_area - 1.0).abs();
+    if figures.area_difference.is_nan() || figures.area_difference > limits.area {
+        let LeafFigures { source_area, leaf_area, area_difference, .. } = figures;
+        check.fail(
+            "all leaves",
+            format!(
+                "area {leaf_area:.6} m² instead of the source's {source_area:.6} m²: off by \
+                 {area_difference:.1e}, limit {:.0e}",
+                limits.area
+            ),
+            HINT,
+        );
+    }
+
+    progress.phase("looking for vertices", surface.positions().len() as u64);
+    let sought = sought_vertices(source, coarsest.min(2.0 * finest));
+    let found = |vertex: usize| {
+        let point = surface.positions()[vertex];
+        [finest, coarsest].iter().any(|step| {
+            let reach = step * (0.5 + LAST_BITS) * 3f64.sqrt();
+            assembly.surface.within(point, reach).iter().any(|hit| {
+                let (leaf, _) = assembly.owner(hit.triangle);
+                let each = steps[leaf as usize] * (0.5 + LAST_BITS);
+                let corners = assembly.surface.corners(hit.triangle);
+                corners.iter().any(|&corner| (corner - point).abs().max_element() <= each)
+            })
+        })
+    };
+    let missing: Vec<Vec<usize>> = (0..sought.len())
+        .step_by(CHUNK)
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .map(|first| {
+            let range = first..(first + CHUNK).min(sought.len());
+            let count = range.len() as u64;
+            let missing = range.filter(|&vertex| sought[vertex] && !found(vertex)).collect();
+            progress.done(count);
+            missing
+        })
+        .collect();
+    figures.thin_vertices = sought.iter().filter(|sought| !**sought).count() as u64;
+    for vertex in missing.into_iter().flatten() {
+        figures.missing_vertices += 1;
+        let point = surface.positions()[vertex];
+        check.fail(
+            format!("source vertex at {} {} {}", point.x, point.y, point.z),
+            format!("no leaf has it within {:.1e} m along each axis", finest * 0.5),
+            HINT,
+        );
+    }
+
+    progress.phase("leaves against the source", leaves.len() as u64);
+    let farthest: Vec<f64> = leaves
+        .par_iter()
+        .enumerate()
+        .map(|(place, &leaf)| {
+            let vertices = geometry[leaf as usize].surface_vertices();
+            let samples = points.of_leaf(place).map(|number| points.all[number].point);
+            progress.done(1);
+            vertices.into_iter().chain(samples).map(|p| surface.distance(p)).fold(0.0, f64::max)
+        })
+        .collect();
+    for (&leaf, &distance) in leaves.iter().zip(&farthest) {
+        figures.farthest = figures.farthest.max(distance);
+        let bound = steps[leaf as usize] * (leaf_bound(scene, leaf) + LAST_BITS) * 3f64.sqrt();
+        if distance > bound {
+            check.fail(
+                &scene.nodes[leaf as usize].file,
+                format!(
+                    "a point of the leaf is {distance:.2e} m from the source, limit {bound:.1e}"
+                ),
+                HINT,
+            );
+        }
+    }
+    check.summary = format!(
+        "area off by {:.1e}; {} of {} source vertices missing ({} of thin triangles not sought), \
+         bound {:.1e} m along each axis; leaves at most {:.1e} m from the source",
+        figures.area_difference,
+        figures.missing_vertices,
+        figures.source_vertices,
+        figures.thin_vertices,
+        finest * 0.5,
+        figures.farthest,
+    );
+    (figures, check)
+}
+
+/// Vertices of triangles whose corners stay apart on a lattice of `step`. The build leaves out
+/// triangles that do not, and says so; what they alone use is not expected in the leaves.
+fn sought_vertices(source: &Source, step: f64) -> Vec<bool> {
+    let surface = &source.surface;
+    let mut sought = vec![false; surface.positions().len()];
+    for (number, triangle) in (0..).zip(surface.triangles()) {
+        let [a, b, c] = surface.corners(number);
+        let apart = |a: glam::DVec3, b: glam::DVec3| (a - b).abs().max_element() > step;
+        if apart(a, b) && apart(b, c) && apart(c, a) {
+            triangle.iter().for_each(|&vertex| sought[vertex as usize] = true);
+        }
+    }
+    sought
+}

@@ -1,0 +1,328 @@
+//! Verifying a built scene: that it is whole, that its leaves are the source, how far each level is
+//! from it, that nothing shows between levels, and how levels look.
+//!
+//! | file | what it checks |
+//! |---|---|
+//! | `structure` | the tree, every file, every attribute |
+//! | `faithful` | leaves against the source: area, vertices, surface |
+//! | `appearance` | leaves' texels; colours and tiles of every level |
+//! | `distance`, `errors` | each level against the source, stored against measured errors |
+//! | `seams`, `cut_planes`, `gaps` | what shows where two levels meet |
+//!
+//! Without a source the leaves stand for it, and what needs it is not checked. Triangles of all
+//! nodes are kept in memory (some 30 bytes each), and the source with its search tree (some 150
+//! bytes a triangle); pictures are decoded node by node.
+
+mod appearance;
+mod assembly;
+mod cut_planes;
+mod distance;
+mod errors;
+mod faithful;
+mod gaps;
+mod geometry;
+mod jpeg;
+mod look;
+mod node_look;
+mod options;
+mod points;
+mod progress;
+mod report;
+mod sample;
+mod seams;
+mod source;
+mod source_colors;
+mod step;
+mod structure;
+mod surface;
+mod tally;
+mod text;
+mod tiles;
+mod tree;
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+pub use options::{Limits, VerifyOptions};
+pub use progress::{Progress, Silent};
+pub use report::{
+    Check, Distance, ErrorFigures, Failure, GapFigures, LeafFigures, LevelFigures, NodeFigures,
+    SceneFacts, TileFigures, VerifyReport,
+};
+pub use text::text;
+
+use appearance::Reference;
+use assembly::Assembly;
+use distance::{LevelDistances, NodeDistances};
+use geometry::NodeGeometry;
+use node_look::NodePictures;
+use points::Points;
+use source::Source;
+
+use crate::format::{SCENE_FILE, Scene};
+use crate::{Error, Result};
+
+/// Verifies the scene in `out` against the models that it was built from; without any, against
+/// its own leaves. An error where there is nothing to verify; what does not hold is in the report.
+pub fn verify(
+    out: &Path,
+    sources: &[PathBuf],
+    options: &VerifyOptions,
+    progress: &dyn Progress,
+) -> Result<VerifyReport> {
+    options.check()?;
+    let mut report = VerifyReport {
+        version: env!("CARGO_PKG_VERSION").into(),
+        out: out.to_string_lossy().into_owned(),
+        source: Vec::new(),
+        options: options.clone(),
+        passed: false,
+        scene: None,
+        checks: Vec::new(),
+        leaves: None,
+        levels: Vec::new(),
+        errors: None,
+        worst_nodes: Vec::new(),
+        gaps: Vec::new(),
+    };
+    let path = out.join(SCENE_FILE);
+    let bytes = std::fs::read(&path)
+        .map_err(|error| Error::input(&path, format!("cannot read the scene: {error}")))?;
+    match Scene::from_bytes(&bytes, &path) {
+        Ok(scene) => {
+            Verification { out, scene: &scene, options, progress }.run(sources, &mut report)?
+        }
+        Err(error) => {
+            let mut check = Check::new("structure");
+            check.fail(SCENE_FILE, error.to_string(), "build the scene again with --force");
+            report.checks.push(check);
+        }
+    }
+    report.passed = report.checks.iter().all(|check| check.passed);
+    Ok(report)
+}
+
+struct Verification<'a> {
+    out: &'a Path,
+    scene: &'a Scene,
+    options: &'a VerifyOptions,
+    progress: &'a dyn Progress,
+}
+
+impl Verification<'_> {
+    fn run(&self, sources: &[PathBuf], report: &mut VerifyReport) -> Result<()> {
+        let Self { out, scene, options, progress } = *self;
+        let source = match sources {
+            [] => None,
+            sources => Some(Source::load(sources, progress)?),
+        };
+        report.source = source.as_ref().map(Source::names).unwrap_or_default();
+        let (mut geometry, check) = structure::structure(out, scene, &options.limits, progress);
+        report.checks.push(check);
+        let leaves = tree::leaves(scene);
+        let steps = step::steps(scene);
+        report.scene = Some(facts(scene, &leaves, &geometry, &steps));
+        let seams = seams::seams(&leaves, &geometry);
+        cut_planes::mark(scene, &mut geometry, &seams, &steps);
+        let points = Points::new(scene, &leaves, &geometry, options.samples, options.seed);
+        let pictures = NodePictures::new(out, scene);
+
+        progress.phase("pictures of the leaves", leaves.len() as u64);
+        let shown = appearance::leaf_colors(&leaves, &points, &pictures, || progress.done(1));
+        let reference = match &source {
+            Some(source) => {
+                self.against_source(source, &leaves, &geometry, &points, &steps, &shown, report)
+            }
+            None => Reference { color: shown.clone(), tile: Vec::new() },
+        };
+        self.levels(
+            source.as_ref(),
+            &leaves,
+            &geometry,
+            &points,
+            &pictures,
+            &steps,
+            &shown,
+            &reference,
+            report,
+        );
+        drop(source);
+        let (figures, check) =
+            gaps::gaps(scene, &geometry, &seams, &steps, &options.limits, progress);
+        report.gaps = figures;
+        report.checks.push(check);
+        Ok(())
+    }
+
+    /// Checks the leaves, and finds what the source shows at all points.
+    fn against_source(
+        &self,
+        source: &Source,
+        leaves: &[u32],
+        geometry: &[NodeGeometry],
+        points: &Points,
+        steps: &[f64],
+        shown: &[Option<look::Color>],
+        report: &mut VerifyReport,
+    ) -> Reference {
+        let Self { scene, options, progress, .. } = *self;
+        let limits = &options.limits;
+        let (mut figures, check) =
+            faithful::faithful(scene, source, leaves, geometry, points, steps, limits, progress);
+        report.checks.push(check);
+        progress.phase("pictures of the source", 1);
+        let quality = scene.parameters["jpeg_quality"].as_u64().unwrap_or(85).clamp(1, 100) as u8;
+        figures.jpeg_rms = jpeg::jpeg_rms(source, quality);
+        // Two roundings of half a step along three axes.
+        let reach = leaves.iter().map(|&leaf| steps[leaf as usize]).fold(0.0, f64::max) * 2.0;
+        let colors = source_colors::source_colors(source, points, geometry, shown, reach);
+        let check = appearance::texels(scene, leaves, points, shown, &colors, &mut figures, limits);
+        report.checks.push(check);
+        let tiles = tiles::Tiles::find(source);
+        let tile = tiles.map_or(Vec::new(), |tiles| {
+            colors.iter().map(|shown| shown.and_then(|shown| tiles.at(&shown.look))).collect()
+        });
+        let color = colors.into_iter().map(|shown| Some(shown?.color)).collect();
+        let reference = Reference { color, tile };
+        if let Some(tiles) = appearance::leaf_tiles(shown, &reference) {
+            let mut check = Check::new("tiles of the leaves");
+            let share = tiles.wrong_share().unwrap_or(0.0);
+            check.summary = format!(
+                "{} of {} samples that are clear of edges show another tile, {} none",
+                tiles.wrong, tiles.clear, tiles.unreadable
+            );
+            if share > limits.wrong_tiles {
+                check.fail(
+                    "all leaves",
+                    format!("{:.2} % of samples show another tile", share * 100.0),
+                    "texels are misplaced: report this",
+                );
+            }
+            report.checks.push(check);
+            figures.tiles = Some(tiles);
+        }
+        report.leaves = Some(figures);
+        progress.done(1);
+        reference
+    }
+
+    /// Measures all levels.
+    fn levels(
+        &self,
+        source: Option<&Source>,
+        leaves: &[u32],
+        geometry: &[NodeGeometry],
+        points: &Points,
+        pictures: &NodePictures,
+        steps: &[f64],
+        shown: &[Option<look::Color>],
+        reference: &Reference,
+        report: &mut VerifyReport,
+    ) {
+        let Self { scene, options, progress, .. } = *self;
+        let joined;
+        let surface = match source {
+            Some(source) => &source.surface,
+            None => {
+                joined = Assembly::new(leaves.iter().copied(), geometry);
+                &joined.surface
+            }
+        };
+        let diagonal = report.scene.as_ref().map_or(0.0, |facts| facts.diagonal);
+        let mut all: Vec<NodeDistances> = Vec::new();
+        for level in 0..tree::coarse_levels(scene) {
+            progress.phase(&format!("level {level}"), leaves.len() as u64);
+            let distances = distance::measure(
+                scene,
+                level,
+                leaves,
+                geometry,
+                points,
+                surface,
+                options.seed,
+                progress,
+            );
+            let (color_rms, tiles) = appearance::level(
+                scene,
+                &distances,
+                points,
+                geometry,
+                pictures,
+                shown,
+                reference,
+                || {},
+            );
+            let figures = self.level_figures(level, geometry, &distances, diagonal);
+            report.levels.push(LevelFigures { color_rms, tiles, ..figures });
+            all.extend(distances.nodes);
+        }
+        let (figures, check) = errors::errors(scene, &all, steps, &options.limits);
+        report.errors = figures;
+        report.checks.push(check);
+        all.sort_by(|a, b| b.max().total_cmp(&a.max()).then(a.node.cmp(&b.node)));
+        let worst = all.iter().take(options.worst);
+        report.worst_nodes = worst.map(|node| node_figures(scene, node, diagonal)).collect();
+    }
+
+    fn level_figures(
+        &self,
+        level: u32,
+        geometry: &[NodeGeometry],
+        distances: &LevelDistances,
+        diagonal: f64,
+    ) -> LevelFigures {
+        let to_front = distance::figures(&distances.to_front, diagonal);
+        let to_source = distance::figures(&distances.to_source, diagonal);
+        let mut figures = LevelFigures {
+            level,
+            nodes: distances.nodes.len() as u64,
+            two_sided: distance::larger(&to_front, &to_source),
+            to_front,
+            to_source,
+            ..LevelFigures::default()
+        };
+        for node in tree::front(self.scene, level) {
+            let geometry = &geometry[node as usize];
+            figures.leaves += u64::from(tree::is_leaf(self.scene, node));
+            figures.triangles += geometry.triangles.len() as u64;
+            figures.cut_plane_triangles +=
+                geometry.in_cut_plane.iter().filter(|&&inside| inside).count() as u64;
+        }
+        figures
+    }
+}
+
+fn facts(scene: &Scene, leaves: &[u32], geometry: &[NodeGeometry], steps: &[f64]) -> SceneFacts {
+    // Leaves' boxes: coarse nodes may reach beyond the source.
+    let boxes = leaves.iter().map(|&leaf| &scene.nodes[leaf as usize]);
+    let low = boxes.clone().fold(DVec3::INFINITY, |low, node| low.min(node.bbox_min.into()));
+    let high = boxes.fold(DVec3::NEG_INFINITY, |high, node| high.max(node.bbox_max.into()));
+    SceneFacts {
+        nodes: scene.nodes.len(),
+        leaves: leaves.len(),
+        levels: scene.level_count(),
+        leaf_triangles: leaves.iter().map(|&l| geometry[l as usize].triangles.len() as u64).sum(),
+        diagonal: if low.x <= high.x { low.distance(high) } else { 0.0 },
+        step: steps.iter().copied().fold(0.0, f64::max),
+    }
+}
+
+fn node_figures(scene: &Scene, measured: &NodeDistances, diagonal: f64) -> NodeFigures {
+    let node = &scene.nodes[measured.node as usize];
+    let farther = if measured.to_front.max() >= measured.to_source.max() {
+        measured.to_front.farthest()
+    } else {
+        measured.to_source.farthest()
+    };
+    NodeFigures {
+        id: node.id,
+        file: node.file.clone(),
+        level: node.level,
+        geometric_error: node.geometric_error,
+        measured: measured.max(),
+        to_front: distance::figures(&measured.to_front, diagonal),
+        to_source: distance::figures(&measured.to_source, diagonal),
+        farthest: farther.into(),
+    }
+}

@@ -1,0 +1,73 @@
+//! What a verification can be asked for, and where its limits lie.
+
+use crate::{Error, Result};
+
+/// How a scene is verified.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct VerifyOptions {
+    /// Points spread over the source by area, from 1,000 on; as many again over each level. Vertices
+    /// are measured besides. More: rarer faults are found, and it takes longer.
+    pub samples: u64,
+    /// Draws the points; equal seeds draw equal points.
+    pub seed: u64,
+    /// Nodes that are listed as the worst.
+    pub worst: usize,
+    /// See [`Limits`].
+    pub limits: Limits,
+}
+
+impl Default for VerifyOptions {
+    fn default() -> Self {
+        Self { samples: 300_000, seed: 1, worst: 5, limits: Limits::default() }
+    }
+}
+
+impl VerifyOptions {
+    /// Refuses what is out of range.
+    pub fn check(&self) -> Result<()> {
+        match self.samples {
+            1_000..=1_000_000_000 => Ok(()),
+            found => Err(Error::Usage(format!("samples is {found}, expected 1000 to 1000000000"))),
+        }
+    }
+}
+
+/// What separates pass from fail. All tolerances stand here.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Limits {
+    /// Relative difference between a stored attribute and its recomputation: room for the last
+    /// bits of sums.
+    pub attribute: f64,
+    /// Relative difference of the area of leaves and source.
+    pub area: f64,
+    /// Stored error over measured error, at most this in the median of the nodes.
+    pub error_ratio: f64,
+    /// Colour error of the leaves (RMS, 0–255) over that of JPEG itself on the source's pictures.
+    pub texel_ratio: f64,
+    /// Added to that: rounding of texels and texture coordinates, 0–255.
+    pub texel_slack: f64,
+    /// Likewise for a single leaf, whose pictures may be harder than the average.
+    pub leaf_texel_ratio: f64,
+    /// Likewise, 0–255.
+    pub leaf_texel_slack: f64,
+    /// Share of samples that may show a wrong tile, where tiles can be told.
+    pub wrong_tiles: f64,
+    /// Gap that counts as none, in steps of the lattice: corners of skirts are rounded to it.
+    pub gap_steps: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            attribute: 1e-9,
+            area: 1e-6,
+            error_ratio: 4.0,
+            texel_ratio: 1.5,
+            texel_slack: 1.0,
+            leaf_texel_ratio: 3.0,
+            leaf_texel_slack: 8.0,
+            wrong_tiles: 0.01,
+            gap_steps: 4.0,
+        }
+    }
+}

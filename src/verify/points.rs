@@ -1,0 +1,46 @@
+//! The points at which levels are compared with the source: spread over the leaves, which are the
+//! source cut into pieces, so that it is known below which nodes each point lies.
+
+use super::geometry::NodeGeometry;
+use super::sample::{SurfacePoint, spread};
+use crate::format::Scene;
+
+/// Points of all leaves, leaf by leaf.
+pub(super) struct Points {
+    /// All points.
+    pub all: Vec<SurfacePoint>,
+    /// The leaf of each.
+    pub leaf: Vec<u32>,
+    /// Where each leaf's points begin, by place among the leaves, and where the last ones end.
+    first: Vec<usize>,
+    /// Points a square metre.
+    pub density: f64,
+}
+
+impl Points {
+    /// About `samples` points over the leaves.
+    pub fn new(
+        scene: &Scene,
+        leaves: &[u32],
+        geometry: &[NodeGeometry],
+        samples: u64,
+        seed: u64,
+    ) -> Self {
+        let area: f64 = leaves.iter().map(|&leaf| geometry[leaf as usize].area()).sum();
+        let density = if area > 0.0 { samples as f64 / area } else { 0.0 };
+        let mut points = Self { all: Vec::new(), leaf: Vec::new(), first: vec![0], density };
+        for &leaf in leaves {
+            let node = &geometry[leaf as usize];
+            let id = scene.nodes[leaf as usize].id;
+            points.all.extend(spread(node.surface(), density, seed, id));
+            points.leaf.resize(points.all.len(), leaf);
+            points.first.push(points.all.len());
+        }
+        points
+    }
+
+    /// The numbers of a leaf's points; the leaf by its place among the leaves.
+    pub fn of_leaf(&self, place: usize) -> std::ops::Range<usize> {
+        self.first[place]..self.first[place + 1]
+    }
+}

@@ -1,0 +1,106 @@
+//! The source as it was imported: its surface and what it looks like.
+
+use std::path::PathBuf;
+
+use glam::DVec3;
+
+use super::look::Look;
+use super::progress::Progress;
+use super::surface::Surface;
+use crate::import::{find_inputs, load};
+use crate::mesh::{Model, TextureSource};
+use crate::{Error, Result};
+
+/// Model files, read and joined.
+pub(super) struct Source {
+    /// All triangles.
+    pub surface: Surface,
+    models: Vec<Model>,
+    parts: Vec<PartPlace>,
+    /// Number of each model's first picture.
+    first_picture: Vec<u32>,
+}
+
+/// Where the triangles of a part begin among all.
+struct PartPlace {
+    first_triangle: u32,
+    first_vertex: u32,
+    model: u32,
+    part: u32,
+}
+
+impl Source {
+    /// Reads models and folders of them, as the build does.
+    pub fn load(arguments: &[PathBuf], progress: &dyn Progress) -> Result<Self> {
+        let inputs = find_inputs(arguments)?;
+        progress.phase("reading the source", inputs.len() as u64 + 1);
+        let (mut positions, mut triangles): (Vec<DVec3>, Vec<[u32; 3]>) = Default::default();
+        let (mut models, mut parts, mut first_picture) = (Vec::new(), Vec::new(), vec![0]);
+        for input in &inputs {
+            let mut model = load(input)?;
+            for (number, part) in (0..).zip(&mut model.parts) {
+                let first_vertex = positions.len() as u32;
+                parts.push(PartPlace {
+                    first_triangle: triangles.len() as u32,
+                    first_vertex,
+                    model: models.len() as u32,
+                    part: number,
+                });
+                positions.extend(std::mem::take(&mut part.positions).into_iter().map(DVec3::from));
+                let corners = std::mem::take(&mut part.indices);
+                triangles
+                    .extend(corners.as_chunks::<3>().0.iter().map(|t| t.map(|v| first_vertex + v)));
+                if u32::try_from(positions.len()).is_err() || triangles.len() > i32::MAX as usize {
+                    return Err(Error::input(input, "more triangles than can be verified at once"));
+                }
+            }
+            first_picture.push(first_picture[models.len()] + model.textures.len() as u32);
+            models.push(model);
+            progress.done(1);
+        }
+        let surface = Surface::new(positions, triangles);
+        progress.done(1);
+        Ok(Self { surface, models, parts, first_picture })
+    }
+
+    /// The files, as given or found.
+    pub fn names(&self) -> Vec<String> {
+        self.models.iter().map(|model| model.source.to_string_lossy().into_owned()).collect()
+    }
+
+    /// How the surface looks at a point of a triangle.
+    pub fn look(&self, triangle: u32, weights: [f64; 3]) -> Look {
+        let place = self.parts.partition_point(|place| place.first_triangle <= triangle) - 1;
+        let place = &self.parts[place];
+        let model = &self.models[place.model as usize];
+        let part = &model.parts[place.part as usize];
+        let material = &model.materials[part.material as usize];
+        let corners = self.surface.triangles()[triangle as usize]
+            .map(|vertex| (vertex - place.first_vertex) as usize);
+        let mut factor: [f64; 3] = std::array::from_fn(|i| f64::from(material.base_color[i]));
+        if !part.colors.is_empty() {
+            let colors = corners.map(|vertex| part.colors[vertex]);
+            for (channel, factor) in factor.iter_mut().enumerate() {
+                let value: f64 = (0..3).map(|i| weights[i] * f64::from(colors[i][channel])).sum();
+                *factor *= value / 65535.0;
+            }
+        }
+        let picture = material
+            .texture
+            .filter(|_| !part.texcoords.is_empty())
+            .map(|texture| self.first_picture[place.model as usize] + texture);
+        let texcoord = match picture {
+            Some(_) => std::array::from_fn(|axis| {
+                let at = |i: usize| f64::from(part.texcoords[corners[i]][axis]);
+                (0..3).map(|i| weights[i] * at(i)).sum()
+            }),
+            None => [0.0; 2],
+        };
+        Look { picture, texcoord, wrap: material.wrap, alpha: material.alpha, factor }
+    }
+
+    /// All pictures, by number.
+    pub fn pictures(&self) -> impl Iterator<Item = (u32, &TextureSource)> {
+        (0..).zip(self.models.iter().flat_map(|model| &model.textures))
+    }
+}

@@ -1,0 +1,53 @@
+//! The lattice that the nodes' coordinates lie on, and so how far they are rounded.
+
+use std::collections::BTreeMap;
+
+use super::tree::line;
+use crate::build::lattice::Lattice;
+use crate::format::Scene;
+
+/// For each node the step of its lattice in metres. Source coordinates are rounded to multiples of
+/// it: by half a step at most along each axis.
+///
+/// The step is not stored. It follows from the largest extent of a block and the largest
+/// coordinate of an input, as [`Lattice::for_extent`] says; a block of strays has its own. Where
+/// an extent is a power of two to a millionth, the result may be twice the real step.
+pub(super) fn steps(scene: &Scene) -> Vec<f64> {
+    let roots: Vec<u32> = (0..scene.nodes.len() as u32)
+        .map(|node| line(scene, node).last().unwrap_or(node))
+        .collect();
+    let mut boxes: BTreeMap<u32, [[f64; 3]; 2]> = BTreeMap::new();
+    for (node, &root) in scene.nodes.iter().zip(&roots) {
+        // Coarse nodes may reach beyond the source; leaves do not.
+        if node.first_child.is_some() {
+            continue;
+        }
+        let [low, high] = boxes.entry(root).or_insert([node.bbox_min, node.bbox_max]);
+        for axis in 0..3 {
+            low[axis] = low[axis].min(node.bbox_min[axis]);
+            high[axis] = high[axis].max(node.bbox_max[axis]);
+        }
+    }
+    // Trees that share a lattice, with the largest extent and coordinate.
+    let mut groups: BTreeMap<(&str, Option<u32>), [f64; 2]> = BTreeMap::new();
+    let group_of = |root: u32| {
+        let block = scene.nodes[root as usize].block;
+        let block = block.and_then(|block| scene.blocks.get(block as usize));
+        let stray = block.is_some_and(|block| block.name.ends_with("(far off)"));
+        (block.map_or("", |block| block.input.as_str()), stray.then_some(root))
+    };
+    for (&root, [low, high]) in &boxes {
+        let [extent, magnitude] = groups.entry(group_of(root)).or_default();
+        for axis in 0..3 {
+            *extent = extent.max(high[axis] - low[axis]);
+            *magnitude = magnitude.max(low[axis].abs()).max(high[axis].abs());
+        }
+    }
+    roots
+        .iter()
+        .map(|&root| {
+            let [extent, magnitude] = groups.get(&group_of(root)).copied().unwrap_or_default();
+            Lattice::for_extent(extent * (1.0 + 1e-6), magnitude).step
+        })
+        .collect()
+}

@@ -1,0 +1,332 @@
+//! Closest points of a triangle mesh, exact in f64.
+//!
+//! The bounding-volume hierarchies have f32 boxes around centres of their own, since they only
+//! guide the search: a box is left out only where it is farther than the best triangle so far by
+//! more than f32 can be wrong. The distance to a triangle is computed in f64 from source
+//! coordinates. Each square of some kilometres has its own hierarchy, so that f32 stays fine where
+//! a scene holds models from both ends of a country.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+
+/// Share of the extent by which a distance to a box may be wrong in f32: that of the point and
+/// that of the box's corner, along three axes.
+const BOX_SLACK: f64 = 4.0 / (1 << 23) as f64;
+
+/// Side of the squares, metres.
+const SQUARE: f64 = 8192.0;
+
+/// A triangle mesh that can be asked for its closest point.
+pub(super) struct Surface {
+    positions: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+    squares: Vec<Square>,
+}
+
+/// The triangles whose first corner lies in one square.
+struct Square {
+    bvh: Bvh2,
+    /// Numbers of the triangles.
+    members: Vec<u32>,
+    low: DVec3,
+    high: DVec3,
+    slack: f64,
+}
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Hit {
+    /// The triangle's number.
+    pub triangle: u32,
+    /// Weights of its corners.
+    pub weights: [f64; 3],
+    /// Source coordinates.
+    pub point: DVec3,
+    /// Squared distance to the point that was asked for.
+    pub squared: f64,
+}
+
+impl Hit {
+    /// Distance to the point that was asked for, metres.
+    pub fn distance(&self) -> f64 {
+        self.squared.sqrt()
+    }
+}
+
+impl Surface {
+    /// A surface of these triangles in source coordinates.
+    pub fn new(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
+        let mut squares: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
+        for (number, triangle) in (0..).zip(&triangles) {
+            let corner = positions[triangle[0] as usize];
+            let square = (corner / SQUARE).floor().to_array().map(|side| side as i64);
+            squares.entry(square).or_default().push(number);
+        }
+        let squares = squares
+            .into_values()
+            .map(|members| Square::new(&positions, &triangles, members))
+            .collect();
+        Self { positions, triangles, squares }
+    }
+
+    /// Corners of a triangle.
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])
+    }
+
+    /// All vertices.
+    pub fn positions(&self) -> &[DVec3] {
+        &self.positions
+    }
+
+    /// The vertices of all triangles.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The point nearest to `point`; `None` where there is no triangle.
+    pub fn closest(&self, point: DVec3) -> Option<Hit> {
+        let mut best: Option<Hit> = None;
+        self.search(point, f64::INFINITY, |hit, reach| {
+            // Of triangles that are equally near the first is taken, whatever the tree looks like.
+            if best.is_none_or(|best| (hit.squared, hit.triangle) < (best.squared, best.triangle)) {
+                *reach = hit.distance();
+                best = Some(hit);
+            }
+        });
+        best
+    }
+
+    /// The distance from `point`; infinite where there is no triangle.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        self.closest(point).map_or(f64::INFINITY, |hit| hit.distance())
+    }
+
+    /// The nearest points of all triangles within `reach` of `point`, by number of triangle.
+    pub fn within(&self, point: DVec3, reach: f64) -> Vec<Hit> {
+        let mut hits = Vec::new();
+        self.search(point, reach, |hit, reach| {
+            if hit.squared <= *reach * *reach {
+                hits.push(hit);
+            }
+        });
+        hits.sort_unstable_by_key(|hit| hit.triangle);
+        hits
+    }
+
+    /// Visits the triangles that may be within `reach`, near ones first; `visit` may lower it.
+    fn search(&self, point: DVec3, mut reach: f64, mut visit: impl FnMut(Hit, &mut f64)) {
+        if let [square] = &self.squares[..] {
+            return square.search(self, point, &mut reach, &mut visit);
+        }
+        let mut squares: Vec<(f64, &Square)> = self
+            .squares
+            .iter()
+            .map(|square| (point.distance(point.clamp(square.low, square.high)), square))
+            .collect();
+        squares.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (distance, square) in squares {
+            if distance > reach {
+                break;
+            }
+            square.search(self, point, &mut reach, &mut visit);
+        }
+    }
+}
+
+impl Square {
+    fn new(positions: &[DVec3], triangles: &[[u32; 3]], members: Vec<u32>) -> Self {
+        let corners = |number: u32| triangles[number as usize].map(|v| positions[v as usize]);
+        let all = || members.iter().flat_map(|&number| corners(number));
+        let low = all().fold(DVec3::INFINITY, DVec3::min);
+        let high = all().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let centre = (low + high) * 0.5;
+        let boxes: Vec<Aabb> = members
+            .iter()
+            .map(|&number| Aabb::from_points(&corners(number).map(|p| (p - centre).as_vec3a())))
+            .collect();
+        let bvh = build_bvh2(&boxes, BvhBuildParams::very_fast_build(), &mut Default::default());
+        Self { bvh, members, low, high, slack: (high - low).max_element() * BOX_SLACK }
+    }
+
+    fn search(
+        &self,
+        surface: &Surface,
+        point: DVec3,
+        reach: &mut f64,
+        visit: &mut impl FnMut(Hit, &mut f64),
+    ) {
+        let from_centre = point - (self.low + self.high) * 0.5;
+        let local: Vec3A = from_centre.as_vec3a();
+        // A point far outside is rounded by more than the square's extent says.
+        let slack = self.slack + from_centre.abs().max_element() * BOX_SLACK;
+        let nodes = &self.bvh.nodes;
+        let to_box = |node: u32| {
+            let bounds = nodes[node as usize].aabb;
+            f64::from((local - local.clamp(bounds.min, bounds.max)).length())
+        };
+        let mut stack: Vec<(f64, u32)> = Vec::with_capacity(96);
+        stack.push((to_box(0), 0));
+        while let Some((distance, number)) = stack.pop() {
+            if distance > *reach + slack {
+                continue;
+            }
+            let node = &nodes[number as usize];
+            if node.is_leaf() {
+                let first = node.first_index as usize;
+                for &member in &self.bvh.primitive_indices[first..first + node.prim_count as usize]
+                {
+                    let triangle = self.members[member as usize];
+                    visit(hit(point, triangle, surface.corners(triangle)), reach);
+                }
+            } else {
+                let (left, right) = (node.first_index, node.first_index + 1);
+                let (near, far) = ((to_box(left), left), (to_box(right), right));
+                let (near, far) = if near.0 <= far.0 { (near, far) } else { (far, near) };
+                stack.push(far);
+                stack.push(near);
+            }
+        }
+    }
+}
+
+fn hit(point: DVec3, triangle: u32, corners: [DVec3; 3]) -> Hit {
+    let weights = nearest_weights(point, corners);
+    let [a, b, c] = corners;
+    let nearest = a * weights[0] + b * weights[1] + c * weights[2];
+    // Relative to the first corner, since weights of large coordinates lose digits.
+    let offset = (b - a) * weights[1] + (c - a) * weights[2] - (point - a);
+    Hit { triangle, weights, point: nearest, squared: offset.length_squared() }
+}
+
+/// Weights of the corners at the nearest point of a triangle, by the region of the plane that the
+/// projection falls in (Ericson, Real-Time Collision Detection, section 5.1.5).
+fn nearest_weights(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return [0.0, 1.0, 0.0];
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        let v = d1 / (d1 - d3);
+        return [1.0 - v, v, 0.0];
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return [0.0, 0.0, 1.0];
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        let w = d2 / (d2 - d6);
+        return [1.0 - w, 0.0, w];
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return [0.0, 1.0 - w, w];
+    }
+    let sum = va + vb + vc;
+    if sum > 0.0 { [va / sum, vb / sum, vc / sum] } else { [1.0, 0.0, 0.0] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// The nearest point by brute force: the projection where it is inside, else of the sides.
+    fn naive(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+        let normal = (b - a).cross(c - a);
+        let side = |from: DVec3, to: DVec3| {
+            let t = ((p - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
+            p.distance(from + (to - from) * t)
+        };
+        let sides = side(a, b).min(side(b, c)).min(side(c, a));
+        let foot = p - normal * ((p - a).dot(normal) / normal.length_squared());
+        let inside = [(a, b), (b, c), (c, a)]
+            .iter()
+            .all(|&(from, to)| (to - from).cross(foot - from).dot(normal) >= 0.0);
+        if inside { p.distance(foot) } else { sides }
+    }
+
+    fn soup(triangles: u32, at: DVec3) -> Surface {
+        let mut random = Random::new(5, 0);
+        let mut positions = Vec::new();
+        for _ in 0..triangles {
+            let mut point = |size: f64| {
+                DVec3::new(
+                    random.between(-size, size),
+                    random.between(-size, size),
+                    random.between(-size, size),
+                )
+            };
+            let centre = at + point(50.0);
+            positions.extend([centre + point(4.0), centre + point(4.0), centre + point(4.0)]);
+        }
+        let corners = (0..triangles).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+        Surface::new(positions, corners)
+    }
+
+    #[test]
+    fn agrees_with_trying_every_triangle_at_any_coordinates() {
+        for at in [DVec3::ZERO, DVec3::new(678_016.0, 5_403_456.0, 300.0)] {
+            let surface = soup(300, at);
+            let mut random = Random::new(6, 0);
+            for _ in 0..500 {
+                let point = at
+                    + DVec3::new(
+                        random.between(-80.0, 80.0),
+                        random.between(-80.0, 80.0),
+                        random.between(-80.0, 80.0),
+                    );
+                let expected = (0..300)
+                    .map(|triangle| naive(point, surface.corners(triangle)))
+                    .fold(f64::INFINITY, f64::min);
+                let found = surface.closest(point).unwrap();
+                assert!((found.distance() - expected).abs() < 1e-8, "{found:?} {expected}");
+                assert!((found.point.distance(point) - expected).abs() < 1e-8);
+                let near = surface.within(point, expected + 5.0);
+                let count = (0..300)
+                    .filter(|&t| naive(point, surface.corners(t)) <= expected + 5.0)
+                    .count();
+                assert_eq!(near.len(), count);
+            }
+        }
+    }
+
+    #[test]
+    fn models_from_far_apart_are_searched_one_by_one() {
+        let (here, there) = (soup(50, DVec3::ZERO), soup(50, DVec3::new(678_016.0, 5e6, 0.0)));
+        let first = here.positions.len() as u32;
+        let triangles = here.triangles.iter().copied();
+        let shifted = there.triangles.iter().map(|triangle| triangle.map(|v| first + v));
+        let both = Surface::new(
+            here.positions.iter().chain(&there.positions).copied().collect(),
+            triangles.chain(shifted).collect(),
+        );
+        assert!(both.squares.len() > 1);
+        for (at, alone) in [(DVec3::ZERO, &here), (DVec3::new(678_016.0, 5e6, 0.0), &there)] {
+            let point = at + DVec3::new(3.0, 40.0, -7.0);
+            assert_eq!(both.distance(point), alone.distance(point));
+        }
+    }
+
+    #[test]
+    fn nothing_is_near_an_empty_surface() {
+        let surface = Surface::new(Vec::new(), Vec::new());
+        assert_eq!(surface.closest(DVec3::ZERO), None);
+        assert!(surface.within(DVec3::ZERO, 1e9).is_empty());
+    }
+}

@@ -1,0 +1,129 @@
+//! The report for people: on one or two screens, ending in pass or fail.
+
+use std::fmt::Write;
+
+use super::report::{Check, Distance, VerifyReport};
+
+/// The report as text.
+pub fn text(report: &VerifyReport) -> String {
+    let mut out = String::new();
+    let mut line = |text: String| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(out, "{text}");
+    };
+    if let Some(scene) = &report.scene {
+        line(format!(
+            "{}: {} nodes on {} levels, {} triangles in {} leaves; diagonal {:.1} m, lattice {:.1e} m",
+            report.out,
+            scene.nodes,
+            scene.levels,
+            scene.leaf_triangles,
+            scene.leaves,
+            scene.diagonal,
+            scene.step
+        ));
+    }
+    match &report.source[..] {
+        [] => line("Against its own leaves, which stand for the source: name it with --source to check the leaves".into()),
+        [one] => line(format!("Against {one}")),
+        [first, others @ ..] => line(format!("Against {first} and {} more", others.len())),
+    }
+    if !report.levels.is_empty() {
+        line(format!(
+            "\nDistance of each level to the source, two-sided, in metres and in 1e-4 of the diagonal; colour RMS of 255\n\
+             {:>5} {:>7} {:>10} {:>9} {:>7} {:>9} {:>7} {:>9} {:>7} {:>7} {:>12}",
+            "level",
+            "nodes",
+            "triangles",
+            "mean m",
+            "e-4",
+            "RMS m",
+            "e-4",
+            "max m",
+            "e-4",
+            "colour",
+            "wrong tiles"
+        ));
+        for level in &report.levels {
+            let Distance { mean, rms, max, mean_relative, rms_relative, max_relative, .. } =
+                level.two_sided;
+            let color = level.color_rms.map_or("-".into(), |rms| format!("{rms:.2}"));
+            let tiles = level.tiles.map_or("-".into(), |tiles| match tiles.wrong_share() {
+                Some(share) if tiles.clear * 20 >= tiles.samples => {
+                    format!("{:.2} %", share * 100.0)
+                }
+                _ => "too coarse".into(),
+            });
+            line(format!(
+                "{:>5} {:>7} {:>10} {:>9.4} {:>7.3} {:>9.4} {:>7.3} {:>9.4} {:>7.2} {:>7} {:>12}",
+                level.level,
+                level.nodes,
+                level.triangles,
+                mean,
+                mean_relative,
+                rms,
+                rms_relative,
+                max,
+                max_relative,
+                color,
+                tiles
+            ));
+        }
+    }
+    if !report.worst_nodes.is_empty() {
+        line(format!(
+            "\nWorst nodes\n{:>5} {:>10} {:>10} {:>10} {:>10}  at, file",
+            "level", "stored m", "measured m", "to front", "to source"
+        ));
+        for node in &report.worst_nodes {
+            let [x, y, z] = node.farthest;
+            line(format!(
+                "{:>5} {:>10.4} {:>10.4} {:>10.4} {:>10.4}  {x:.2} {y:.2} {z:.2}, {}",
+                node.level,
+                node.geometric_error,
+                node.measured,
+                node.to_front.max,
+                node.to_source.max,
+                node.file
+            ));
+        }
+    }
+    if !report.gaps.is_empty() {
+        line(format!(
+            "\nWidest gaps where two levels meet at a cut\n{:>7} {:>10} {:>16} {:>12} {:>14}",
+            "levels", "points", "without skirts m", "of the error", "left open m"
+        ));
+        for gap in &report.gaps {
+            line(format!(
+                "{:>3} | {:<1} {:>10} {:>16.4} {:>12.2} {:>14.2e}",
+                gap.a, gap.b, gap.points, gap.bare, gap.bare_relative, gap.open
+            ));
+        }
+    }
+    line(String::new());
+    for check in &report.checks {
+        line(format!("{}  {}: {}", verdict(check.passed), check.name, check.summary));
+        failures(check, &mut line);
+    }
+    line(format!("\n{}", if report.passed { "PASS" } else { "FAIL" }));
+    out
+}
+
+fn failures(check: &Check, line: &mut impl FnMut(String)) {
+    for failure in &check.failures {
+        line(format!("        {}: {}", failure.place, failure.what));
+    }
+    let more = check.failure_count - check.failures.len() as u64;
+    if more > 0 {
+        line(format!("        … and {more} more"));
+    }
+    let mut hints: Vec<&str> = check.failures.iter().map(|failure| failure.hint).collect();
+    hints.dedup();
+    for hint in hints {
+        line(format!("        try: {hint}"));
+    }
+}
+
+fn verdict(passed: bool) -> &'static str {
+    if passed { "pass" } else { "FAIL" }
+}
