@@ -1,19 +1,24 @@
 //! Which triangles of coarse nodes lie in cutting planes: skirts, which cover gaps.
 //!
-//! The format does not say which triangles these are, and need not: a triangle in the plane of a
-//! cut that bounds its node stands across the surface and shows only where levels meet. The source
-//! has no surface there, and skirts promise none: so they are no part of the distances between
-//! surfaces. What they do promise, that nothing shows between two levels, [`super::gaps`] checks.
+//! The format does not say which triangles these are. They are known by where they stand: in the
+//! plane of a cut that bounds their node, one or two of them together and joined to nothing else.
+//! They show only where levels meet. The source has no surface there, and skirts promise none: so
+//! they are no part of the distances between surfaces. What they do promise, that nothing shows
+//! between two levels, [`super::gaps`] checks. A skirt that is made otherwise counts as surface,
+//! and must be as near to the source as all of its node.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use super::geometry::NodeGeometry;
+use super::runs::Runs;
 use super::sample::cross;
 use super::seams::Seam;
 use super::tree::{apart, is_leaf};
 use crate::format::{Node, Scene};
+use crate::mesh::{PositionKey, key};
 
 /// How far a triangle in a cutting plane may be from it, as a share of its longest edge. A border
 /// vertex may lie beside the plane by a hundredth of the edge that was not split there.
@@ -46,10 +51,15 @@ pub(super) fn mark(scene: &Scene, geometry: &mut [NodeGeometry], seams: &[Seam],
         }
         let planes: Vec<(usize, f64)> =
             planes[number].iter().map(|&(axis, bits)| (axis, f64::from_bits(bits))).collect();
+        let alone = stand_alone(node);
         node.in_cut_plane = node
             .triangles
             .iter()
-            .map(|&triangle| {
+            .zip(alone)
+            .map(|(&triangle, alone)| {
+                if !alone {
+                    return false;
+                }
                 let corners = node.corners(triangle);
                 let [a, b, c] = corners;
                 let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
@@ -63,6 +73,28 @@ pub(super) fn mark(scene: &Scene, geometry: &mut [NodeGeometry], seams: &[Seam],
             })
             .collect();
     });
+}
+
+/// Triangles a skirt has.
+const MOST_TOGETHER: u32 = 2;
+
+/// For each triangle, whether it is joined to one other triangle at most.
+fn stand_alone(node: &NodeGeometry) -> Vec<bool> {
+    let mut first: FxHashMap<PositionKey<f32>, u32> = FxHashMap::default();
+    let welded: Vec<u32> = (0..)
+        .zip(&node.positions)
+        .map(|(vertex, &position)| *first.entry(key(position)).or_insert(vertex))
+        .collect();
+    let mut runs = Runs::new(node.positions.len());
+    for triangle in &node.triangles {
+        let [a, b, c] = triangle.map(|vertex| welded[vertex as usize]);
+        runs.join(a, b);
+        runs.join(b, c);
+    }
+    let tops: Vec<u32> = node.triangles.iter().map(|t| runs.top(welded[t[0] as usize])).collect();
+    let mut counts = vec![0u32; node.positions.len()];
+    tops.iter().for_each(|&top| counts[top as usize] += 1);
+    tops.into_iter().map(|top| counts[top as usize] <= MOST_TOGETHER).collect()
 }
 
 /// The plane that holds most of the edges between two leaves and separates their boxes.

@@ -158,3 +158,113 @@ pub(super) fn larger(a: &Distance, b: &Distance) -> Distance {
         max_relative: a.max_relative.max(b.max_relative),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::super::sample::cross;
+    use super::*;
+    use crate::format::test_scene::scene;
+    use crate::random::Random;
+
+    /// A bumpy sheet of `side` by `side` squares from `x` on.
+    fn sheet(x: f32, side: u32, bump: f64, seed: u64) -> NodeGeometry {
+        let mut random = Random::new(seed, 0);
+        let mut sheet = NodeGeometry { origin: DVec3::new(7e5, 0.0, 0.0), ..Default::default() };
+        for i in 0..=side {
+            for j in 0..=side {
+                let z = random.between(0.0, bump) as f32;
+                sheet.positions.push([
+                    x + i as f32 * 8.0 / side as f32,
+                    j as f32 * 8.0 / side as f32,
+                    z,
+                ]);
+            }
+        }
+        for at in (0..side * (side + 1)).filter(|at| at % (side + 1) != side) {
+            let [a, b, c, d] = [at, at + side + 1, at + side + 2, at + 1];
+            sheet.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+        sheet
+    }
+
+    /// The distance to the nearest of some triangles: by trying all, each by its plane and sides.
+    fn naive(point: DVec3, triangles: &[[DVec3; 3]]) -> f64 {
+        let to_triangle = |&[a, b, c]: &[DVec3; 3]| {
+            let normal = cross([a, b, c]);
+            let foot = point - normal * ((point - a).dot(normal) / normal.length_squared());
+            let inside = [(a, b), (b, c), (c, a)]
+                .iter()
+                .all(|&(from, to)| (to - from).cross(foot - from).dot(normal) >= 0.0);
+            let side = |from: DVec3, to: DVec3| {
+                let along = to - from;
+                let t = ((point - from).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+                point.distance(from + along * t)
+            };
+            let sides = side(a, b).min(side(b, c)).min(side(c, a));
+            if inside { point.distance(foot) } else { sides }
+        };
+        triangles.iter().map(to_triangle).fold(f64::INFINITY, f64::min)
+    }
+
+    fn all(nodes: &[&NodeGeometry]) -> Vec<[DVec3; 3]> {
+        nodes.iter().flat_map(|node| node.surface().map(|(_, corners)| corners)).collect()
+    }
+
+    #[test]
+    fn distances_are_those_of_brute_force() {
+        // Nodes 2 and 3 are leaves below 1, below 0; node 4 is a leaf and a root.
+        let scene = scene();
+        let geometry = [
+            sheet(0.0, 2, 0.4, 1),
+            sheet(0.0, 3, 0.4, 2),
+            sheet(0.0, 6, 0.4, 3),
+            sheet(8.0, 6, 0.4, 4),
+            sheet(40.0, 6, 0.4, 5),
+        ];
+        let leaves = [2, 3, 4];
+        let points = Points::new(&scene, &leaves, &geometry, 600, 9);
+        let joined = Assembly::new(leaves.into_iter(), &geometry);
+        let source = all(&[&geometry[2], &geometry[3], &geometry[4]]);
+        for level in 0..2u32 {
+            let front = all(&[&geometry[level as usize], &geometry[4]]);
+            let found = measure(
+                &scene,
+                level,
+                &leaves,
+                &geometry,
+                &points,
+                &joined.surface,
+                9,
+                &super::super::Silent,
+            );
+            let below = [points.of_leaf(0), points.of_leaf(1)].map(|range| &points.all[range]);
+            let samples: Vec<DVec3> = below.concat().iter().map(|point| point.point).collect();
+            let distances: Vec<f64> = samples.iter().map(|&p| naive(p, &front)).collect();
+            let vertices =
+                [&geometry[2], &geometry[3]].map(NodeGeometry::surface_vertices).concat();
+            let max = vertices.iter().map(|&p| naive(p, &front)).chain(distances.iter().copied());
+            let max = max.fold(0.0, f64::max);
+            let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+            let node = found.nodes[0].to_front;
+            assert_eq!(node.count(), samples.len() as u64);
+            assert!((node.mean() - mean).abs() < 1e-9 && (node.max() - max).abs() < 1e-9);
+            let squares = distances.iter().map(|d| d * d).sum::<f64>();
+            // The leaf above the level counts as no distance.
+            assert_eq!(found.to_front.count(), points.all.len() as u64);
+            let rms = (squares / points.all.len() as f64).sqrt();
+            assert!((found.to_front.rms() - rms).abs() < 1e-9);
+
+            let node = &geometry[level as usize];
+            let drawn = spread(node.surface(), points.density, 9, scene.nodes[level as usize].id);
+            let distances = drawn.iter().map(|sample| naive(sample.point, &source));
+            let vertices = node.surface_vertices();
+            let max = vertices.iter().map(|&p| naive(p, &source)).chain(distances.clone());
+            let max = max.fold(0.0, f64::max);
+            let mean = distances.sum::<f64>() / drawn.len() as f64;
+            let tally = found.nodes[0].to_source;
+            assert!((tally.mean() - mean).abs() < 1e-9 && (tally.max() - max).abs() < 1e-9);
+        }
+    }
+}

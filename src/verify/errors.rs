@@ -2,12 +2,13 @@
 //! above it.
 
 use super::distance::NodeDistances;
+use super::faithful::rounding;
 use super::options::Limits;
 use super::report::{Check, ErrorFigures};
 use crate::format::Scene;
 
-/// Compares stored and measured errors of all coarse nodes. A lattice `step` each is room for the
-/// rounding of coordinates, and the least that is counted as measured.
+/// Compares stored and measured errors of all coarse nodes. What leaves may be off by rounding is
+/// room for both, and the least that is counted as measured; `steps` are the lattice's.
 pub(super) fn errors(
     scene: &Scene,
     nodes: &[NodeDistances],
@@ -19,10 +20,10 @@ pub(super) fn errors(
     let mut too_small: Vec<(f64, String, String)> = Vec::new();
     for measured in nodes {
         let node = &scene.nodes[measured.node as usize];
-        let step = steps[measured.node as usize];
+        let rounding = rounding(scene, measured.node, steps[measured.node as usize]);
         let (stored, max) = (node.geometric_error, measured.max());
-        ratios.push(stored.max(step) / max.max(step));
-        if stored + step < max {
+        ratios.push(stored.max(rounding) / max.max(rounding));
+        if stored + rounding < max {
             let at = if measured.to_front.max() >= measured.to_source.max() {
                 (measured.to_front.farthest(), "the source is", "the front")
             } else {

@@ -12,13 +12,18 @@ use super::sample::area;
 use super::source::Source;
 use crate::format::Scene;
 
-/// How far a point of a leaf may be from the source, in steps along each axis: half a step for the
-/// rounding of source vertices, and as much again for each cut on the way to the leaf, since a cut
-/// rounds the vertices that it makes.
-fn leaf_bound(scene: &Scene, leaf: u32) -> f64 {
+/// How far a point of a leaf may be from the source for rounding, metres: half a step along each
+/// axis for the rounding of source vertices, and as much again for each cut on the way to the
+/// leaf, since a cut rounds the vertices that it makes. Of a coarse node: the bound of the leaves
+/// on its scene's last level.
+pub(super) fn rounding(scene: &Scene, node: u32, step: f64) -> f64 {
     let factor = scene.parameters["level_factor"].as_u64().unwrap_or(4).clamp(2, 64);
     let cuts_each = factor.next_power_of_two().ilog2();
-    0.5 + 0.5 * f64::from(scene.nodes[leaf as usize].level * cuts_each)
+    let level = match &scene.nodes[node as usize] {
+        leaf if leaf.first_child.is_none() => leaf.level,
+        _ => scene.level_count().saturating_sub(1) as u32,
+    };
+    step * (0.5 * f64::from(1 + level * cuts_each) + LAST_BITS) * 3f64.sqrt()
 }
 
 /// Room for the last bits of f64 in coordinates, as a share of a step.
@@ -120,7 +125,7 @@ pub(super) fn faithful(
         .collect();
     for (&leaf, &distance) in leaves.iter().zip(&farthest) {
         figures.farthest = figures.farthest.max(distance);
-        let bound = steps[leaf as usize] * (leaf_bound(scene, leaf) + LAST_BITS) * 3f64.sqrt();
+        let bound = rounding(scene, leaf, steps[leaf as usize]);
         if distance > bound {
             check.fail(
                 &scene.nodes[leaf as usize].file,

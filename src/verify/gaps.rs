@@ -24,6 +24,7 @@ use super::geometry::NodeGeometry;
 use super::options::Limits;
 use super::progress::Progress;
 use super::report::{Check, Failure, GapFigures};
+use super::runs::Runs;
 use super::seams::{Seam, rim};
 use super::surface::Surface;
 use super::tree::{apart, is_leaf};
@@ -58,7 +59,7 @@ pub(super) fn gaps(
     let mut check = Check::new("gaps");
     progress.phase("gaps", seams.len() as u64);
     let groups = groups(scene, seams);
-    let found: Vec<(BTreeMap<[u32; 2], GapFigures>, Vec<Failure>)> = groups
+    let found: Vec<(BTreeMap<[u32; 2], GapFigures>, Vec<(f64, Failure)>)> = groups
         .par_iter()
         .map(|group| {
             let found = look_at(scene, geometry, group, steps, limits);
@@ -67,8 +68,9 @@ pub(super) fn gaps(
         })
         .collect();
     let mut pairs: BTreeMap<[u32; 2], GapFigures> = BTreeMap::new();
+    let mut widest_first: Vec<(f64, Failure)> = Vec::new();
     for (figures, failures) in found {
-        check.extend(failures);
+        widest_first.extend(failures);
         for (levels, figures) in figures {
             let all = pairs.entry(levels).or_default();
             all.points += figures.points;
@@ -79,6 +81,9 @@ pub(super) fn gaps(
             all.open_relative = all.open_relative.max(figures.open_relative);
         }
     }
+    // Stable, so that equal ones stay in the order of nodes.
+    widest_first.sort_by(|a, b| b.0.total_cmp(&a.0));
+    check.extend(widest_first.into_iter().map(|(_, failure)| failure));
     let figures: Vec<GapFigures> =
         pairs.into_iter().map(|([a, b], figures)| GapFigures { a, b, ..figures }).collect();
     let (points, left_out) =
@@ -115,7 +120,7 @@ fn look_at(
     seams: &[&Seam],
     steps: &[f64],
     limits: &Limits,
-) -> (BTreeMap<[u32; 2], GapFigures>, Vec<Failure>) {
+) -> (BTreeMap<[u32; 2], GapFigures>, Vec<(f64, Failure)>) {
     let points = |seam: &Seam| PLACES.map(|at| seam.ends[0].lerp(seam.ends[1], at));
     let sides: Vec<[Vec<u32>; 2]> =
         seams.iter().map(|seam| apart(scene, seam.leaves[0], seam.leaves[1])).collect();
@@ -208,17 +213,18 @@ impl Worst {
         }
     }
 
-    fn into_failures(self, scene: &Scene) -> Vec<Failure> {
+    fn into_failures(self, scene: &Scene) -> Vec<(f64, Failure)> {
         let file = |node: u32| scene.nodes[node as usize].file.as_str();
         self.0
             .into_iter()
-            .map(|([a, b], (open, point))| Failure {
-                place: format!("{} beside {}", file(a), file(b)),
-                what: format!(
-                    "a gap of {open:.4} m at {:.3} {:.3} {:.3}",
-                    point.x, point.y, point.z
-                ),
-                hint: "build with --borders skirts or locked; if it was, report this",
+            .map(|([a, b], (open, point))| {
+                let at = format!("{:.3} {:.3} {:.3}", point.x, point.y, point.z);
+                let failure = Failure {
+                    place: format!("{} beside {}", file(a), file(b)),
+                    what: format!("a gap of {open:.5} m at {at}"),
+                    hint: "build with --borders skirts or locked; if it was, report this",
+                };
+                (open, failure)
             })
             .collect()
     }
@@ -245,33 +251,20 @@ impl NodeNear {
 
     /// For each seam, whether the node has a vertex on the connected run that it belongs to.
     fn kept<'a>(&self, seams: impl Iterator<Item = &'a Seam> + Clone) -> Vec<bool> {
-        let mut run_of: FxHashMap<PositionKey<f64>, u32> = FxHashMap::default();
-        let mut above: Vec<u32> = Vec::new();
-        fn top(above: &mut [u32], mut run: u32) -> u32 {
-            while above[run as usize] != run {
-                above[run as usize] = above[above[run as usize] as usize];
-                run = above[run as usize];
-            }
-            run
-        }
+        let mut numbers: FxHashMap<PositionKey<f64>, u32> = FxHashMap::default();
+        let mut runs = Runs::new(0);
         let ends = |seam: &Seam| seam.ends.map(|end| key(end.to_array()));
         for seam in seams.clone() {
-            let [a, b] = ends(seam).map(|end| {
-                let run = *run_of.entry(end).or_insert_with(|| {
-                    above.push(above.len() as u32);
-                    above.len() as u32 - 1
-                });
-                top(&mut above, run)
-            });
-            above[a.max(b) as usize] = a.min(b);
+            let [a, b] = ends(seam).map(|end| *numbers.entry(end).or_insert_with(|| runs.push()));
+            runs.join(a, b);
         }
-        let mut kept = vec![false; above.len()];
+        let mut kept = vec![false; numbers.len()];
         for position in self.drawn.positions() {
-            if let Some(&run) = run_of.get(&key(position.to_array())) {
-                kept[top(&mut above, run) as usize] = true;
+            if let Some(&number) = numbers.get(&key(position.to_array())) {
+                kept[runs.top(number) as usize] = true;
             }
         }
-        seams.map(|seam| kept[top(&mut above, run_of[&ends(seam)[0]]) as usize]).collect()
+        seams.map(|seam| kept[runs.top(numbers[&ends(seam)[0]]) as usize]).collect()
     }
 
     fn meets(&self, point: DVec3, tolerance: f64) -> Meets {

@@ -28,6 +28,7 @@ mod options;
 mod points;
 mod progress;
 mod report;
+mod runs;
 mod sample;
 mod seams;
 mod source;
@@ -120,6 +121,10 @@ impl Verification<'_> {
         report.source = source.as_ref().map(Source::names).unwrap_or_default();
         let (mut geometry, check) = structure::structure(out, scene, &options.limits, progress);
         report.checks.push(check);
+        if geometry.iter().any(|node| node.triangles.is_empty()) {
+            // What is missing would fail every other check too, and hide its own faults.
+            return Ok(());
+        }
         let leaves = tree::leaves(scene);
         let steps = step::steps(scene);
         report.scene = Some(facts(scene, &leaves, &geometry, &steps));

@@ -13,3 +13,4 @@ mod output;
 mod paths;
 mod real_data;
 mod soups;
+mod verify;
