@@ -1,49 +1,40 @@
 //! The distance between a mesh and its simplification, measured, both ways.
 //!
 //! The Hausdorff distance obeys the triangle inequality, so the distances between a node and its
-//! children's meshes, summed down to the leaves, bound the distance to the original. It is
-//! sampled at the vertices of both meshes and the centres of the simplified triangles; what the
-//! samples may miss is covered by [`SAMPLING_ALLOWANCE`].
+//! children's meshes, summed down to the leaves, bound the distance to the original.
+//!
+//! It is measured at all vertices of both meshes and at the centres of those triangles that are
+//! larger than the average, in parts of about the average size, so that what is missing between
+//! vertices is found as well. Only
+//! the largest distance counts: of most points it is enough to know that they are not farther than
+//! another one, which the first triangle at hand shows. What lies between the points is covered by
+//! [`ALLOWANCE`].
 
 use glam::Vec3;
-use rustc_hash::FxHashSet;
 
-use crate::mesh::{Mesh, PositionKey, key};
+use crate::mesh::Mesh;
 
 /// The measured distance is multiplied by this, since the farthest point of a surface need not be
-/// one of the samples.
-pub const SAMPLING_ALLOWANCE: f64 = 2.0;
+/// one of those that are measured.
+pub const ALLOWANCE: f64 = 2.0;
 
-/// Points that are tried in each direction; evenly spread over the vertices in question.
+/// How often a triangle is divided into four at most.
+const MOST_DIVISIONS: u32 = 5;
+
+/// Points that are tried in each direction for the mean; evenly spread over the triangles.
 const MOST_SAMPLES: usize = 320;
 
-/// The two-sided distance between two meshes over the same surface, metres.
+/// Triangles that are tried first.
+const SCOUTS: usize = 64;
+
+/// A bound on the two-sided distance between two meshes over the same surface, metres.
 pub fn hausdorff(source: &Mesh, simplified: &Mesh) -> f64 {
     if source.triangles.is_empty() || simplified.triangles.is_empty() {
         return 0.0;
     }
-    // A vertex that both have is at no distance.
-    let kept: FxHashSet<PositionKey<f32>> =
-        simplified.positions.iter().map(|&position| key(position)).collect();
-    let gone: Vec<Vec3> = source
-        .positions
-        .iter()
-        .filter(|&&position| !kept.contains(&key(position)))
-        .map(|&position| position.into())
-        .collect();
-    if gone.is_empty() && simplified.triangles.len() == source.triangles.len() {
-        return 0.0;
-    }
-    let worst = TriangleGrid::new(simplified).farthest(&gone, 0.0);
-    let mut points: Vec<Vec3> = Vec::with_capacity(simplified.triangles.len() * 2);
-    for &triangle in &simplified.triangles {
-        let [a, b, c] = triangle.map(|v| Vec3::from(simplified.positions[v as usize]));
-        points.push((a + b + c) / 3.0);
-        // Its corners are sampled in turn, one for each triangle.
-        points.push(a);
-    }
-    let worst = TriangleGrid::new(source).farthest(&points, worst);
-    f64::from(worst) * SAMPLING_ALLOWANCE
+    let worst = TriangleGrid::new(simplified).farthest(source, 0.0);
+    let worst = TriangleGrid::new(source).farthest(simplified, worst);
+    f64::from(worst) * ALLOWANCE
 }
 
 /// The mean distance between two meshes, metres: that of the triangles' centres, weighted by
@@ -151,13 +142,55 @@ impl TriangleGrid {
         self.first = ends;
     }
 
-    /// The farthest of some of the points, or `least` where none is farther.
-    fn farthest(&self, points: &[Vec3], least: f32) -> f32 {
-        let stride = points.len().div_ceil(MOST_SAMPLES).max(1);
-        points
-            .iter()
-            .step_by(stride)
-            .fold(least, |worst, &point| worst.max(self.distance_beyond(point, worst)))
+    /// The farthest of the vertices of `mesh` and of points on its triangles, or `least` where none
+    /// is farther.
+    fn farthest(&self, mesh: &Mesh, least: f32) -> f32 {
+        let mut worst = least;
+        // The triangle that was near enough to the point before: mostly it is to the next one too.
+        let mut last = 0;
+        let mut measure = |point: Vec3| {
+            let [a, b, c] = self.triangles[last as usize];
+            if squared_distance(point, a, b, c) > worst * worst {
+                let (distance, nearest) = self.search(point, worst);
+                (worst, last) = (worst.max(distance), nearest);
+            }
+        };
+        let corners = |triangle: [u32; 3]| triangle.map(|v| Vec3::from(mesh.positions[v as usize]));
+        // Scouts, evenly spread, find about how large the largest is; the others need then hardly
+        // be looked at.
+        let stride = mesh.triangles.len().div_ceil(SCOUTS);
+        for &triangle in mesh.triangles.iter().step_by(stride) {
+            let [a, b, c] = corners(triangle);
+            measure((a + b + c) * (1.0 / 3.0));
+        }
+        mesh.positions.iter().for_each(|&position| measure(position.into()));
+        let squared_area =
+            |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a).length_squared().min(f32::MAX);
+        let areas = mesh.triangles.iter().map(|&triangle| squared_area(corners(triangle)).sqrt());
+        let mean = areas.sum::<f32>() / mesh.triangles.len() as f32;
+        let mut parts: Vec<([Vec3; 3], u32)> = Vec::new();
+        for &triangle in &mesh.triangles {
+            // Each quarter has a sixteenth of the squared area.
+            let whole = corners(triangle);
+            let (mut left, mut divisions) = (squared_area(whole), 0);
+            if left < mean * mean {
+                continue;
+            }
+            while left > 4.0 * mean * mean && divisions < MOST_DIVISIONS {
+                (left, divisions) = (left / 16.0, divisions + 1);
+            }
+            parts.push((whole, divisions));
+            while let Some(([a, b, c], divisions)) = parts.pop() {
+                if divisions == 0 {
+                    measure((a + b + c) * (1.0 / 3.0));
+                    continue;
+                }
+                let (ab, bc, ca) = ((a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5);
+                let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
+                parts.extend(quarters.map(|quarter| (quarter, divisions - 1)));
+            }
+        }
+        worst
     }
 
     /// The cell of a point, or the nearest to it. A point on a wall may count to either side.
@@ -178,6 +211,11 @@ impl TriangleGrid {
     /// The distance from `point` to the nearest triangle; any number not above `enough` where it
     /// is known not to exceed that.
     fn distance_beyond(&self, point: Vec3, enough: f32) -> f32 {
+        self.search(point, enough).0
+    }
+
+    /// The same, and the triangle.
+    fn search(&self, point: Vec3, enough: f32) -> (f32, u32) {
         let home = self.cell_at(point);
         let side = 1.0 / self.per_cell;
         // The point may lie outside of the grid.
@@ -188,7 +226,7 @@ impl TriangleGrid {
             point.distance(point.clamp(self.low, high))
         };
         let enough_squared = enough * enough;
-        let mut best = f32::INFINITY;
+        let (mut best, mut nearest) = (f32::INFINITY, 0);
         let rings = self.cells[0].max(self.cells[1]).max(self.cells[2]);
         for ring in 0..=rings {
             // Nothing in this ring or beyond is nearer than this.
@@ -203,11 +241,14 @@ impl TriangleGrid {
                         return;
                     }
                     let [a, b, c] = self.triangles[triangle as usize];
-                    best = best.min(squared_distance(point, a, b, c));
+                    let squared = squared_distance(point, a, b, c);
+                    if squared < best {
+                        (best, nearest) = (squared, triangle);
+                    }
                 }
             });
         }
-        best.sqrt()
+        (best.sqrt(), nearest)
     }
 
     /// Visits the cells whose largest index distance from `home` is `ring`.
@@ -288,8 +329,61 @@ mod tests {
         let flat = mesh(&square, &[[0, 1, 2], [0, 2, 3]]);
         let lifted = mesh(&square.map(|[x, y, _]| [x, y, 0.5]), &[[0, 1, 2], [0, 2, 3]]);
         assert_eq!(hausdorff(&flat, &flat), 0.0);
-        let distance = hausdorff(&flat, &lifted) / SAMPLING_ALLOWANCE;
+        let distance = hausdorff(&flat, &lifted) / ALLOWANCE;
         assert!((distance - 0.5).abs() < 1e-6, "{distance}");
+    }
+
+    /// A hole in the middle of a triangle whose corners all stay, which no vertex is far from.
+    #[test]
+    fn what_is_missing_between_kept_vertices_is_found() {
+        let square = [[0.0, 0.0, 0.0], [9.0, 0.0, 0.0], [9.0, 9.0, 0.0], [0.0, 9.0, 0.0]];
+        let whole = mesh(&square, &[[0, 1, 2], [0, 2, 3]]);
+        let half = mesh(&square, &[[0, 1, 2]]);
+        let farthest = 9.0 * 0.5f64.sqrt();
+        for (source, simplified) in [(&whole, &half), (&half, &whole)] {
+            let bound = hausdorff(source, simplified);
+            assert!(
+                bound >= farthest && bound <= farthest * ALLOWANCE + 1e-6,
+                "{bound} {farthest}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_bound_holds_for_points_all_over_both_surfaces() {
+        let mut state = 3u32;
+        let mut random = || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        for _ in 0..20 {
+            let side = 8u32;
+            let positions: Vec<[f32; 3]> = (0..side * side)
+                .map(|at| [(at % side) as f32, (at / side) as f32, random() * random()])
+                .collect();
+            let mut triangles = Vec::new();
+            for at in (0..side * (side - 1)).filter(|at| at % side != side - 1) {
+                triangles.push([at, at + 1, at + side]);
+                triangles.push([at + 1, at + side + 1, at + side]);
+            }
+            let source = mesh(&positions, &triangles);
+            triangles.retain(|_| random() < 0.6);
+            let fewer = mesh(&positions, &triangles);
+            let bound = hausdorff(&source, &fewer);
+            let grid = TriangleGrid::new(&fewer);
+            let mut farthest = 0f32;
+            for &triangle in &source.triangles {
+                let [a, b, c] = triangle.map(|v| Vec3::from(positions[v as usize]));
+                for _ in 0..30 {
+                    let (u, v) = (random(), random());
+                    let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                    let point = a + (b - a) * u + (c - a) * v;
+                    farthest = farthest.max(grid.distance_beyond(point, 0.0));
+                }
+            }
+            assert!(f64::from(farthest) <= bound, "{farthest} {bound}");
+            assert!(bound <= f64::from(farthest) * ALLOWANCE * 1.1, "{farthest} {bound}");
+        }
     }
 
     #[test]
