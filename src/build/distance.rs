@@ -371,7 +371,8 @@ mod tests {
             let fewer = mesh(&positions, &triangles);
             let bound = hausdorff(&source, &fewer);
             let grid = TriangleGrid::new(&fewer);
-            let mut farthest = 0f32;
+            let at_vertices = positions.iter().map(|&p| grid.distance_beyond(p.into(), 0.0));
+            let mut farthest = at_vertices.fold(0f32, f32::max);
             for &triangle in &source.triangles {
                 let [a, b, c] = triangle.map(|v| Vec3::from(positions[v as usize]));
                 for _ in 0..30 {
