@@ -70,7 +70,9 @@ fn help_names_every_option_with_its_unit_and_range() {
         "--force",
         "--quiet",
         "inspect",
-        "0 success, 1 internal error, 2 usage, 3 input missing or invalid, 4 output not written",
+        "verify",
+        "0 success, 1 internal error, 2 usage, 3 input missing or invalid, or what verify looked at \
+         does not hold, 4 output not written",
     ];
     let mut done = hlod_build().arg("--help").assert().success().stderr(is_empty());
     for part in parts {
