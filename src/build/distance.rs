@@ -3,12 +3,13 @@
 //! The Hausdorff distance obeys the triangle inequality, so the distances between a node and its
 //! children's meshes, summed down to the leaves, bound the distance to the original.
 //!
-//! It is measured at all vertices of both meshes and at the centres of those triangles that are
-//! larger than the average, in parts of about the average size, so that what is missing between
-//! vertices is found as well. Only
-//! the largest distance counts: of most points it is enough to know that they are not farther than
-//! another one, which the first triangle at hand shows. What lies between the points is covered by
-//! [`ALLOWANCE`].
+//! It is measured at all vertices of both meshes and at the centres of all triangles, those of
+//! larger ones in parts of about the average size, so that what is missing between vertices is
+//! found as well: where a triangle alone is missing, the point of it that is farthest from its
+//! sides is at most 1.5 times as far as its centre (three times the longest side over the
+//! perimeter). Only the largest distance counts: of most points it is enough to know that they are
+//! not farther than another one, which the first triangle at hand shows. What lies between the
+//! points is covered by [`ALLOWANCE`].
 
 use glam::Vec3;
 
@@ -73,7 +74,7 @@ struct TriangleGrid {
 }
 
 /// Cells for each triangle: more makes the search cheaper and the grid dearer.
-const CELLS_PER_TRIANGLE: f32 = 1.0;
+const CELLS_PER_TRIANGLE: f32 = 4.0;
 
 /// Most cells along an axis, so that a cell's place fits bytes.
 const MOST_CELLS: i32 = 256;
@@ -173,9 +174,6 @@ impl TriangleGrid {
             // Each quarter has a sixteenth of the squared area.
             let whole = corners(triangle);
             let (mut left, mut divisions) = (squared_area(whole), 0);
-            if left < mean * mean {
-                continue;
-            }
             while left > 4.0 * mean * mean && divisions < MOST_DIVISIONS {
                 (left, divisions) = (left / 16.0, divisions + 1);
             }

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use hlod::format::{NODES_DIR, REPORT_FILE, file_crc};
+use hlod::format::{NODES_DIR, REPORT_FILE, SCENE_FILE, file_crc};
 
 use crate::support::Random;
 use crate::support::inputs::{small_city, write_city};
@@ -37,6 +38,11 @@ fn leftovers(folder: &Path) -> Vec<String> {
 /// True where an unfinished output has all its files.
 fn is_report_written(folder: &Path) -> bool {
     leftovers(folder).iter().any(|name| folder.join(name).join(REPORT_FILE).exists())
+}
+
+/// Which file the scene is: another one once a new result is in place.
+fn identity(out: &Path) -> Option<u64> {
+    fs::metadata(out.join(SCENE_FILE)).ok().map(|file| file.ino())
 }
 
 #[test]
@@ -76,8 +82,12 @@ fn a_killed_build_leaves_a_whole_result() {
             let share = (kill as f64 + random.unit()) / KILLS as f64;
             std::thread::sleep(Duration::from_millis(1) + longest.mul_f64(share));
         } else {
-            // Where the new result is complete and takes the old one's place.
-            while child.try_wait().unwrap().is_none() && !is_report_written(folder.path()) {}
+            // Where the new result is complete and takes the old one's place; each second time
+            // when it has, however long this machine takes over it.
+            let before = identity(&out);
+            let is_running = |child: &mut Child| child.try_wait().unwrap().is_none();
+            while is_running(&mut child) && !is_report_written(folder.path()) {}
+            while kill % 4 == 3 && is_running(&mut child) && identity(&out) == before {}
             std::thread::sleep(Duration::from_micros(random.below(3_000) as u64));
         }
         let wait = begin.elapsed();

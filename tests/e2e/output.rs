@@ -331,14 +331,6 @@ fn errors_too_low(case: &Case, samples: usize) -> Vec<String> {
 }
 
 #[test]
-fn geometric_errors_are_not_below_the_measured_distance() {
-    for case in cases().iter().filter(|case| case.name != "city by clustering") {
-        assert_eq!(errors_too_low(case, 300), [""; 0], "{}", case.name);
-    }
-}
-
-#[test]
-#[ignore = "the build samples too few points for this: by clustering it misses up to a sixth"]
 fn geometric_errors_are_not_below_the_distance_measured_densely() {
     let too_low: Vec<String> =
         cases().iter().flat_map(|case| errors_too_low(case, 4_000)).collect();
