@@ -80,6 +80,10 @@ struct VerifyArgs {
     /// Draws the points: the same figures for the same seed
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Measure a front of mixed levels too, cut where the stored errors say, of at most this share
+    /// of the leaves' triangles, over 0 to 1
+    #[arg(long, value_name = "SHARE")]
+    front: Option<f64>,
     /// Worst nodes to list
     #[arg(long, value_name = "N", default_value_t = 5)]
     worst: usize,
@@ -254,6 +258,7 @@ fn verify_scene(arguments: &VerifyArgs) -> ExitCode {
         samples: arguments.samples,
         seed: arguments.seed,
         worst: arguments.worst,
+        front: arguments.front,
         ..Default::default()
     };
     let bar = PhaseBar::new(arguments.quiet);

@@ -54,8 +54,10 @@ pub enum BorderMode {
 pub const LEAST_TRIANGLES: usize = 8;
 
 /// A node keeps at most one border vertex on a plane for this many triangles of its budget: each
-/// costs about a triangle of the mesh and two of a skirt, and a node has two planes.
-const BUDGET_PER_BORDER_VERTEX: f64 = 12.0;
+/// costs about a triangle of the mesh and two of a skirt, and a node has two planes. Measured: with
+/// half of this scans gain border and lose more on the surface; with twice, borders are coarser
+/// than the surface (`docs/choices.md`).
+const BUDGET_PER_BORDER_VERTEX: f64 = 24.0;
 
 /// How one block is built.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::distance::LevelDistances;
+use super::distance::FrontDistances;
 use super::geometry::NodeGeometry;
 use super::look::{Color, squared_difference};
 use super::node_look::{NodePictures, NodePoint};
@@ -105,7 +105,7 @@ const HINT: &str = "build again with --force; a higher --jpeg-quality lowers JPE
 /// the leaves' own difference.
 pub(super) fn level(
     scene: &Scene,
-    distances: &LevelDistances,
+    distances: &FrontDistances,
     points: &Points,
     geometry: &[NodeGeometry],
     pictures: &NodePictures,

@@ -2,14 +2,14 @@
 //! Scopigno 1998): points spread by area over each surface, and all vertices, to the closest point
 //! of the other.
 //!
-//! The front of a level consists of all its nodes and the leaves above it. From a node the
-//! distance is to the whole source, since any part of it may be the nearest. From the source it is
-//! to the whole front, and counts for the node above the leaf that the point lies on: that node
-//! stands for it. Leaves above the level are the source itself and count as no distance.
+//! From a node the distance is to the whole source, since any part of it may be the nearest. From
+//! the source it is to the whole front, and counts for the node above the leaf that the point lies
+//! on: that node stands for it. Leaves in the front are the source itself and count as no distance.
 
 use rayon::prelude::*;
 
 use super::assembly::Assembly;
+use super::front::Front;
 use super::geometry::NodeGeometry;
 use super::points::Points;
 use super::progress::Progress;
@@ -17,10 +17,10 @@ use super::report::Distance;
 use super::sample::spread;
 use super::surface::Surface;
 use super::tally::Tally;
-use super::tree::{at_level, front, is_leaf};
+use super::tree::is_leaf;
 use crate::format::Scene;
 
-/// A node of a level and its distances.
+/// A node of a front and its distances.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NodeDistances {
     /// The node.
@@ -38,8 +38,8 @@ impl NodeDistances {
     }
 }
 
-/// What was measured of a level.
-pub(super) struct LevelDistances {
+/// What was measured of a front.
+pub(super) struct FrontDistances {
     /// Its nodes that are no leaves, in order.
     pub nodes: Vec<NodeDistances>,
     /// From the source to the front.
@@ -51,21 +51,21 @@ pub(super) struct LevelDistances {
     pub closest: Vec<(u32, u32, u32, [f64; 3])>,
 }
 
-/// Measures a level. `reference` is the source, or the leaves joined.
+/// Measures a front. `reference` is the source, or the leaves joined.
 pub(super) fn measure(
     scene: &Scene,
-    level: u32,
+    front: &Front,
     leaves: &[u32],
     geometry: &[NodeGeometry],
     points: &Points,
     reference: &Surface,
     seed: u64,
     progress: &dyn Progress,
-) -> LevelDistances {
-    let assembly = Assembly::new(front(scene, level), geometry);
+) -> FrontDistances {
+    let assembly = Assembly::new(front.nodes(), geometry);
     let mut place_of = vec![usize::MAX; scene.nodes.len()];
     let mut nodes: Vec<NodeDistances> = Vec::new();
-    for node in front(scene, level).filter(|&node| !is_leaf(scene, node)) {
+    for node in front.nodes().filter(|&node| !is_leaf(scene, node)) {
         place_of[node as usize] = nodes.len();
         let (to_front, to_source) = Default::default();
         nodes.push(NodeDistances { node, to_front, to_source });
@@ -76,7 +76,7 @@ pub(super) fn measure(
         .par_iter()
         .enumerate()
         .filter_map(|(place, &leaf)| {
-            let above = at_level(scene, leaf, level).filter(|&node| node != leaf)?;
+            let above = front.above(scene, leaf).filter(|&node| node != leaf)?;
             let mut tally = Tally::default();
             let mut closest = Vec::new();
             for number in points.of_leaf(place) {
@@ -123,13 +123,13 @@ pub(super) fn measure(
         to_source.extend(&node.to_source);
     }
     for (place, &leaf) in leaves.iter().enumerate() {
-        if scene.nodes[leaf as usize].level <= level {
+        if front.has(leaf) {
             let count = points.of_leaf(place).len() as u64;
             to_front.add_zeros(count);
             to_source.add_zeros(count);
         }
     }
-    LevelDistances { nodes, to_front, to_source, closest }
+    FrontDistances { nodes, to_front, to_source, closest }
 }
 
 /// A tally in metres and in units of 1e-4 of a diagonal.
@@ -228,10 +228,10 @@ mod tests {
         let joined = Assembly::new(leaves.into_iter(), &geometry);
         let source = all(&[&geometry[2], &geometry[3], &geometry[4]]);
         for level in 0..2u32 {
-            let front = all(&[&geometry[level as usize], &geometry[4]]);
+            let drawn = all(&[&geometry[level as usize], &geometry[4]]);
             let found = measure(
                 &scene,
-                level,
+                &Front::level(&scene, level),
                 &leaves,
                 &geometry,
                 &points,
@@ -241,10 +241,10 @@ mod tests {
             );
             let below = [points.of_leaf(0), points.of_leaf(1)].map(|range| &points.all[range]);
             let samples: Vec<DVec3> = below.concat().iter().map(|point| point.point).collect();
-            let distances: Vec<f64> = samples.iter().map(|&p| naive(p, &front)).collect();
+            let distances: Vec<f64> = samples.iter().map(|&p| naive(p, &drawn)).collect();
             let vertices =
                 [&geometry[2], &geometry[3]].map(NodeGeometry::surface_vertices).concat();
-            let max = vertices.iter().map(|&p| naive(p, &front)).chain(distances.iter().copied());
+            let max = vertices.iter().map(|&p| naive(p, &drawn)).chain(distances.iter().copied());
             let max = max.fold(0.0, f64::max);
             let mean = distances.iter().sum::<f64>() / distances.len() as f64;
             let node = found.nodes[0].to_front;
@@ -257,12 +257,12 @@ mod tests {
             assert!((found.to_front.rms() - rms).abs() < 1e-9);
 
             let node = &geometry[level as usize];
-            let drawn = spread(node.surface(), points.density, 9, scene.nodes[level as usize].id);
-            let distances = drawn.iter().map(|sample| naive(sample.point, &source));
+            let spots = spread(node.surface(), points.density, 9, scene.nodes[level as usize].id);
+            let distances = spots.iter().map(|sample| naive(sample.point, &source));
             let vertices = node.surface_vertices();
             let max = vertices.iter().map(|&p| naive(p, &source)).chain(distances.clone());
             let max = max.fold(0.0, f64::max);
-            let mean = distances.sum::<f64>() / drawn.len() as f64;
+            let mean = distances.sum::<f64>() / spots.len() as f64;
             let tally = found.nodes[0].to_source;
             assert!((tally.mean() - mean).abs() < 1e-9 && (tally.max() - max).abs() < 1e-9);
         }

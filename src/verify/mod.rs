@@ -19,6 +19,7 @@ mod cut_planes;
 mod distance;
 mod errors;
 mod faithful;
+mod front;
 mod gaps;
 mod geometry;
 mod jpeg;
@@ -55,7 +56,8 @@ pub use text::text;
 
 use appearance::Reference;
 use assembly::Assembly;
-use distance::{LevelDistances, NodeDistances};
+use distance::{FrontDistances, NodeDistances};
+use front::Front;
 use geometry::NodeGeometry;
 use node_look::NodePictures;
 use points::Points;
@@ -83,6 +85,7 @@ pub fn verify(
         checks: Vec::new(),
         leaves: None,
         levels: Vec::new(),
+        front: None,
         errors: None,
         worst_nodes: Vec::new(),
         gaps: Vec::new(),
@@ -236,18 +239,10 @@ impl Verification<'_> {
         };
         let diagonal = report.scene.as_ref().map_or(0.0, |facts| facts.diagonal);
         let mut all: Vec<NodeDistances> = Vec::new();
-        for level in 0..tree::coarse_levels(scene) {
-            progress.phase(&format!("level {level}"), leaves.len() as u64);
-            let distances = distance::measure(
-                scene,
-                level,
-                leaves,
-                geometry,
-                points,
-                surface,
-                options.seed,
-                progress,
-            );
+        let measure = |front: &Front, level: u32| {
+            let seed = options.seed;
+            let distances =
+                distance::measure(scene, front, leaves, geometry, points, surface, seed, progress);
             let (color_rms, tiles) = appearance::level(
                 scene,
                 &distances,
@@ -258,9 +253,21 @@ impl Verification<'_> {
                 reference,
                 || {},
             );
-            let figures = self.level_figures(level, geometry, &distances, diagonal);
-            report.levels.push(LevelFigures { color_rms, tiles, ..figures });
-            all.extend(distances.nodes);
+            let figures = self.level_figures(front, level, geometry, &distances, diagonal);
+            (LevelFigures { color_rms, tiles, ..figures }, distances.nodes)
+        };
+        for level in 0..tree::coarse_levels(scene) {
+            progress.phase(&format!("level {level}"), leaves.len() as u64);
+            let (figures, nodes) = measure(&Front::level(scene, level), level);
+            report.levels.push(figures);
+            all.extend(nodes);
+        }
+        if let Some(share) = options.front {
+            let triangles = report.scene.as_ref().map_or(0, |facts| facts.leaf_triangles);
+            let front = Front::of_size(scene, (triangles as f64 * share) as u64);
+            progress.phase("a front of mixed levels", leaves.len() as u64);
+            let deepest = front.nodes().map(|node| scene.nodes[node as usize].level).max();
+            report.front = Some(measure(&front, deepest.unwrap_or(0)).0);
         }
         let (figures, check) = errors::errors(scene, &all, steps, &options.limits);
         report.errors = figures;
@@ -272,9 +279,10 @@ impl Verification<'_> {
 
     fn level_figures(
         &self,
+        front: &Front,
         level: u32,
         geometry: &[NodeGeometry],
-        distances: &LevelDistances,
+        distances: &FrontDistances,
         diagonal: f64,
     ) -> LevelFigures {
         let to_front = distance::figures(&distances.to_front, diagonal);
@@ -287,7 +295,7 @@ impl Verification<'_> {
             to_source,
             ..LevelFigures::default()
         };
-        for node in tree::front(self.scene, level) {
+        for node in front.nodes() {
             let geometry = &geometry[node as usize];
             figures.leaves += u64::from(tree::is_leaf(self.scene, node));
             figures.triangles += geometry.triangles.len() as u64;

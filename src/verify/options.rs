@@ -12,19 +12,27 @@ pub struct VerifyOptions {
     pub seed: u64,
     /// Nodes that are listed as the worst.
     pub worst: usize,
+    /// Where given, a front of mixed levels is measured as well, cut where the stored errors say, of
+    /// at most this share of the leaves' triangles; over 0, at most 1.
+    pub front: Option<f64>,
     /// See [`Limits`].
     pub limits: Limits,
 }
 
 impl Default for VerifyOptions {
     fn default() -> Self {
-        Self { samples: 300_000, seed: 1, worst: 5, limits: Limits::default() }
+        Self { samples: 300_000, seed: 1, worst: 5, front: None, limits: Limits::default() }
     }
 }
 
 impl VerifyOptions {
     /// Refuses what is out of range.
     pub fn check(&self) -> Result<()> {
+        if let Some(share) = self.front
+            && !(share > 0.0 && share <= 1.0)
+        {
+            return Err(Error::Usage(format!("front is {share}, expected over 0 and at most 1")));
+        }
         match self.samples {
             1_000..=1_000_000_000 => Ok(()),
             found => Err(Error::Usage(format!("samples is {found}, expected 1000 to 1000000000"))),

@@ -30,6 +30,8 @@ pub struct VerifyReport {
     pub leaves: Option<LeafFigures>,
     /// Distance and appearance, one entry a level that has nodes other than leaves.
     pub levels: Vec<LevelFigures>,
+    /// The front of mixed levels that was asked for; its `level` is that of its deepest node.
+    pub front: Option<LevelFigures>,
     /// Stored against measured errors; `None` where all nodes are leaves.
     pub errors: Option<ErrorFigures>,
     /// The nodes that are farthest from the source, worst first.
@@ -145,14 +147,14 @@ pub struct LeafFigures {
     pub tiles: Option<TileFigures>,
 }
 
-/// Distance and appearance of the front made of all nodes of a level and the leaves above it.
+/// Distance and appearance of a front: all nodes of a level and the leaves above it, or another.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct LevelFigures {
     /// Steps from the root.
     pub level: u32,
-    /// Nodes of the level that are no leaves.
+    /// Its nodes that are no leaves.
     pub nodes: u64,
-    /// Leaves of the level and above it.
+    /// Its leaves.
     pub leaves: u64,
     /// Triangles of the front.
     pub triangles: u64,

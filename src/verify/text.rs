@@ -44,7 +44,9 @@ pub fn text(report: &VerifyReport) -> String {
             "colour",
             "wrong tiles"
         ));
-        for level in &report.levels {
+        let levels = report.levels.iter().map(|figures| (figures.level.to_string(), figures));
+        for (name, level) in levels.chain(report.front.iter().map(|front| ("front".into(), front)))
+        {
             let Distance { mean, rms, max, mean_relative, rms_relative, max_relative, .. } =
                 level.two_sided;
             let color = level.color_rms.map_or("-".into(), |rms| format!("{rms:.2}"));
@@ -56,7 +58,7 @@ pub fn text(report: &VerifyReport) -> String {
             });
             line(format!(
                 "{:>5} {:>7} {:>10} {:>9.4} {:>7.3} {:>9.4} {:>7.3} {:>9.4} {:>7.2} {:>7} {:>12}",
-                level.level,
+                name,
                 level.nodes,
                 level.triangles,
                 mean,

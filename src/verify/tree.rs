@@ -2,16 +2,6 @@
 
 use crate::format::Scene;
 
-/// Nodes on a level of the front: all nodes of the level and the leaves above it.
-pub(super) fn front(scene: &Scene, level: u32) -> impl Iterator<Item = u32> {
-    (0..)
-        .zip(&scene.nodes)
-        .filter(move |(_, node)| {
-            node.level == level || (node.level < level && node.first_child.is_none())
-        })
-        .map(|(number, _)| number)
-}
-
 /// True for a node without children.
 pub(super) fn is_leaf(scene: &Scene, node: u32) -> bool {
     scene.nodes[node as usize].first_child.is_none()
@@ -25,11 +15,6 @@ pub(super) fn leaves(scene: &Scene) -> Vec<u32> {
 /// A node and those above it, from the node up.
 pub(super) fn line(scene: &Scene, node: u32) -> impl Iterator<Item = u32> {
     std::iter::successors(Some(node), |&node| scene.nodes[node as usize].parent)
-}
-
-/// The node of a level that is above `node` or is it; `None` where `node` is above that level.
-pub(super) fn at_level(scene: &Scene, node: u32, level: u32) -> Option<u32> {
-    line(scene, node).find(|&above| scene.nodes[above as usize].level == level)
 }
 
 /// The levels that have nodes other than leaves: from the roots' down to the last but one.
@@ -62,14 +47,10 @@ mod tests {
     use crate::format::test_scene::scene;
 
     #[test]
-    fn fronts_and_lines() {
+    fn leaves_and_lines() {
         let scene = scene();
         assert_eq!(coarse_levels(&scene), 2);
-        assert_eq!(front(&scene, 0).collect::<Vec<_>>(), [0, 4]);
-        assert_eq!(front(&scene, 2).collect::<Vec<_>>(), [2, 3, 4]);
         assert_eq!(leaves(&scene), [2, 3, 4]);
-        assert_eq!(at_level(&scene, 3, 1), Some(1));
-        assert_eq!(at_level(&scene, 4, 1), None);
         assert_eq!(apart(&scene, 2, 3), [vec![2], vec![3]]);
         assert_eq!(apart(&scene, 2, 4), [vec![2, 1, 0], vec![4]]);
     }
