@@ -151,27 +151,14 @@ impl<C: Coordinate> CutPlane<C> {
         places.iter().map(|&(chain, at)| self.chains[chain as usize].keep[at as usize]).min()
     }
 
-    /// The original polyline between two border vertices that are neighbours at `level`, ends
-    /// included: the run whose inner vertices are all gone at that level.
-    pub fn run_between(&self, a: [C; 3], b: [C; 3], level: u8) -> Option<&[[C; 3]]> {
-        let from = self.places(a)?;
-        let to = self.places(b)?;
-        let mut best: Option<&[[C; 3]]> = None;
-        for &(chain_a, at_a) in from {
-            for &(chain_b, at_b) in to {
-                if chain_a != chain_b || at_a == at_b {
-                    continue;
-                }
-                let chain = &self.chains[chain_a as usize];
-                let (low, high) = (at_a.min(at_b) as usize, at_a.max(at_b) as usize);
-                let inner_gone = || chain.keep[low + 1..high].iter().all(|&keep| keep > level);
-                let shorter = best.is_none_or(|best| high - low + 1 < best.len());
-                if shorter && inner_gone() {
-                    best = Some(&chain.positions[low..=high]);
-                }
-            }
-        }
-        best
+    /// Where the edge between two positions stands on this border: the chain, and the place in it
+    /// of the first of both. `None` where it is no edge of this border.
+    pub fn edge_place(&self, a: [C; 3], b: [C; 3]) -> Option<(u32, u32)> {
+        let (from, to) = (self.places(a)?, self.places(b)?);
+        from.iter().find_map(|&(chain, at)| {
+            let next = |&&(other, here): &&(u32, u32)| other == chain && here.abs_diff(at) == 1;
+            to.iter().find(next).map(|&(_, here)| (chain, at.min(here)))
+        })
     }
 }
 
@@ -273,9 +260,8 @@ mod tests {
         assert_eq!(plane.chains.len(), 1);
         assert_eq!(plane.keep_level(points[0]), Some(1));
         assert_eq!(plane.keep_level(points[4]), Some(3));
-        let run = plane.run_between(points[0], points[8], 1).unwrap();
-        assert_eq!(run.len(), 9);
-        assert!(plane.run_between(points[0], points[8], 3).is_none(), "all are kept there");
+        assert_eq!(plane.edge_place(points[5], points[4]), Some((0, 4)));
+        assert_eq!(plane.edge_place(points[5], points[3]), None);
     }
 
     #[test]

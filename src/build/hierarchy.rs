@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use super::border::{Border, Path};
+use super::border_run::{BorderRun, join_runs, original_runs};
 use super::chain::KeepRule;
 use super::cut::{Cut, CutTolerance, Piece, cut};
 use super::distance::hausdorff;
@@ -18,7 +19,7 @@ use super::remnant::remnant;
 use super::simplify::{AppearanceWeights, LadderStep, Simplified, Simplifier, simplify};
 use super::skirt::{Skirt, skirts, triangles_of};
 use super::stages::{Stage, Stages};
-use super::thin_border::{border_edges, edge_key, edges_among, thin_border};
+use super::thin_border::thin_border;
 use crate::Result;
 use crate::mesh::Mesh;
 
@@ -165,6 +166,8 @@ pub struct BlockBuilder<'a, S> {
 struct Carried {
     mesh: Mesh,
     border: Border,
+    /// The pieces of its border, if skirts are to cover them.
+    runs: Vec<BorderRun>,
     error: f64,
 }
 
@@ -206,12 +209,16 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let from_original =
             self.options.simplify_from == SimplifyFrom::Original || level + 1 == self.leaf_level();
         let (carried, record, children) = if from_original {
-            let source =
-                Carried { mesh: piece.mesh.clone(), border: piece.border.clone(), error: 0.0 };
-            let (node, children) = rayon::join(
-                || self.coarse_node(source, &path, level, place, budget),
-                || self.children(piece, level, place),
-            );
+            let (mesh, border) = (piece.mesh.clone(), piece.border.clone());
+            let simplify = || {
+                let runs = match self.options.borders {
+                    BorderMode::Skirts => original_runs(&mesh, &border, &path),
+                    BorderMode::Locked | BorderMode::Shared => Vec::new(),
+                };
+                let source = Carried { mesh, border, runs, error: 0.0 };
+                self.coarse_node(source, &path, level, place, budget)
+            };
+            let (node, children) = rayon::join(simplify, || self.children(piece, level, place));
             let ((record, carried), children) = (node?, children?);
             (carried, record, children.into_iter().map(|(tree, _)| tree).collect())
         } else {
@@ -222,8 +229,8 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
                 parts.iter().map(|part| (&part.mesh, &part.border)).collect();
             let (mesh, border) = merge(&pairs, path.len());
             let error = parts.iter().map(|part| part.error).fold(0.0, f64::max);
-            drop(parts);
-            let source = Carried { mesh, border, error };
+            let runs = parts.into_iter().flat_map(|part| part.runs).collect();
+            let source = Carried { mesh, border, runs, error };
             let (record, carried) = self.coarse_node(source, &path, level, place, budget)?;
             (carried, record, trees)
         };
@@ -331,28 +338,23 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         place: &[u32],
         budget: usize,
     ) -> Result<(S::Record, Carried)> {
-        let Carried { mesh: source_mesh, mut border, error: error_below } = source;
+        let Carried { mesh: source_mesh, mut border, runs, error: error_below } = source;
         let at = level as u8;
-        let with_skirts = self.options.borders == BorderMode::Skirts;
         let step = self.lattice.step;
-        let (simplified, skirts) = self.stages.time(Stage::Simplify, || {
+        let (simplified, runs, skirts) = self.stages.time(Stage::Simplify, || {
             let mut mesh = source_mesh.clone();
             thin_border(&mut mesh, &mut border, path, at);
             // Skirts count towards the budget, but may not take more than half of it.
-            let edges = if with_skirts { border_edges(&mesh, &border, path) } else { Vec::new() };
-            let skirt_triangles = triangles_of(&skirts(&mesh, &border, &edges, path, at, step));
+            let runs = join_runs(runs, path, at, &mesh, &border);
+            let skirt_triangles = triangles_of(&skirts(&mesh, &border, &runs, path, step));
             let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
             let HierarchyOptions { simplifier, weights, .. } = *self.options;
             let mut result = simplify(&mesh, &border, path, at, target, simplifier, weights);
             if result.mesh.triangles.is_empty() {
                 result = remnant(&source_mesh, &border, LEAST_TRIANGLES.min(target));
             }
-            // Simplification renumbers vertices, and may fold the mesh over an edge of the border
-            // so that it looks like an inner one; the border is there all the same.
-            let edges = edges.into_iter().map(|ends| edge_key(&mesh, ends)).collect();
-            let edges = edges_among(&edges, &result.mesh, &result.border, path);
-            let skirts = skirts(&result.mesh, &result.border, &edges, path, at, step);
-            (result, skirts)
+            let skirts = skirts(&result.mesh, &result.border, &runs, path, step);
+            (result, runs, skirts)
         });
         let Simplified { mesh, border, step, .. } = simplified;
         let error = self.stages.time(Stage::Measure, || hausdorff(&source_mesh, &mesh));
@@ -367,6 +369,6 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             step,
             locked: border.planes.iter().filter(|&&planes| planes & path.bits() != 0).count(),
         })?;
-        Ok((record, Carried { mesh, border, error: total_error }))
+        Ok((record, Carried { mesh, border, runs, error: total_error }))
     }
 }

@@ -4,6 +4,7 @@ pub mod attributes;
 pub mod block;
 pub mod blocks;
 pub mod border;
+pub mod border_run;
 pub mod chain;
 pub mod cluster;
 pub mod compact;

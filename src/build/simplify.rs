@@ -195,6 +195,7 @@ fn collapse(
     }
     if step == LadderStep::Prune {
         options |= SimplifyOptions::Prune;
+        join_locked(&mut indices, locked);
     }
     let mut error = 0f32;
     let count = meshopt::simplify_with_update(
@@ -211,18 +212,29 @@ fn collapse(
     );
     indices.truncate(count);
     restore_unmoved(&mut positions, &mesh.positions);
+    let mut triangles = indices.as_chunks::<3>().0.to_vec();
+    triangles.retain(|[_, b, c]| b != c);
     let mut result = Mesh {
         positions,
         texcoords: mesh.texcoords.clone(),
         colors: mesh.colors.clone(),
         materials: mesh.materials.clone(),
-        triangles: indices.as_chunks::<3>().0.to_vec(),
+        triangles,
     };
     write_attributes(&mut result, &attributes, attribute_weights.len());
     let mut border = border.clone();
     mend_materials(&mut result, &mut border, mesh);
     let (mesh, border) = compact(&result, &border);
     Simplified { mesh, border, error: f64::from(error), step }
+}
+
+/// Makes one part of all parts that touch a border: they go on beyond it, so how small they look
+/// here says nothing, and where the neighbour keeps its part of one there would be a hole. They go
+/// only where all of them together look small. Joined by triangles without area, which take part in nothing but the search for parts.
+fn join_locked(indices: &mut Vec<u32>, locked: &[bool]) {
+    let mut locked = (0..).zip(locked).filter(|(_, locked)| **locked).map(|(vertex, _)| vertex);
+    let Some(first) = locked.next() else { return };
+    indices.extend(locked.flat_map(|vertex| [first, vertex, vertex]));
 }
 
 /// meshoptimizer scales positions to a unit box and back, so a vertex that it did not move may
@@ -322,5 +334,52 @@ fn protect_material_borders(mesh: &Mesh, locks: &mut [SimplifyVertex]) {
         if first[&key(mesh.positions[vertex])].1 {
             *lock |= SimplifyVertex::Protect;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// Adds a bumpy sheet of `side` by `side` squares.
+    fn add_sheet(mesh: &mut Mesh, at: f32, side: u32, size: f32) {
+        let mut random = Random::new(3, 0);
+        let first = mesh.positions.len() as u32;
+        for place in 0..(side + 1) * (side + 1) {
+            let [x, y] = [place / (side + 1), place % (side + 1)].map(|i| i as f32 * size);
+            mesh.positions.push([at + x, y, size * random.between(0.0, 1.0) as f32]);
+            mesh.materials.push(0);
+        }
+        for place in (0..side * (side + 1)).filter(|place| place % (side + 1) != side) {
+            let [a, b, c, d] = [0, side + 1, side + 2, 1].map(|step| first + place + step);
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+
+    #[test]
+    fn parts_that_touch_a_border_are_not_left_out_for_looking_small() {
+        let mut mesh = Mesh::default();
+        add_sheet(&mut mesh, 0.0, 12, 1.0);
+        let small = mesh.positions.len()..mesh.positions.len() + 9;
+        add_sheet(&mut mesh, 20.0, 2, 0.05);
+        let prune = |locked: &[bool]| {
+            let border = Border::interior(mesh.positions.len());
+            let weights = AppearanceWeights::default();
+            let step = LadderStep::Prune;
+            collapse(&mesh, &border, locked, 24, step, weights).mesh
+        };
+        let has_small = |mesh: &Mesh| mesh.positions.iter().any(|position| position[0] > 19.0);
+        let mut locked = vec![false; mesh.positions.len()];
+        assert!(!has_small(&prune(&locked)), "a separate part goes");
+        // The border goes through the large part, too.
+        locked[0] = true;
+        locked[small.start..small.start + 3].fill(true);
+        let kept = prune(&locked);
+        let places: Vec<[f32; 3]> = mesh.positions[small.start..small.start + 3].to_vec();
+        assert!(places.iter().all(|place| kept.positions.contains(place)));
+        assert!(kept.triangles.iter().all(|[a, b, c]| a != b && b != c && c != a));
+        // What joined them is gone.
+        assert!(kept.area() < 400.0, "{}", kept.area());
     }
 }

@@ -7,10 +7,13 @@
 //! are, both sides reach the original polyline and nothing shows between them. A leaf follows the
 //! original exactly and needs none.
 //!
+//! Where several pieces of the border have the same edge, each has a skirt on it.
+//!
 //! An end of the edge may lie beside the plane rather than on it ([`super::cut`]). From there to
 //! the polyline's next vertex the region leaves the plane, and a triangle closes that part.
 
 use super::border::{Border, Path};
+use super::border_run::{BorderRun, edges_of};
 use crate::mesh::{Mesh, wide};
 
 /// What covers the region between one border edge and the original polyline.
@@ -27,33 +30,27 @@ pub struct Skirt {
 /// The rectangles reach this share of their own width beyond the polyline.
 const MARGIN: f64 = 0.02;
 
-/// The skirts that the border edges of a node of `path` at `level` need. `step` is the lattice
-/// step in metres.
+/// The skirts that a node needs whose border on `path` is made of `runs`; those whose edge the mesh
+/// has not have nothing to hang on. `step` is the lattice step in metres.
 pub fn skirts(
     mesh: &Mesh,
     border: &Border,
-    edges: &[[u32; 2]],
+    runs: &[BorderRun],
     path: &Path,
-    level: u8,
     step: f64,
 ) -> Vec<Skirt> {
-    let bits = path.bits();
-    let mut result = Vec::new();
-    for &edge in edges {
-        let [a, b] = edge.map(|vertex| mesh.positions[vertex as usize]);
-        let mut common = border.planes[edge[0] as usize] & border.planes[edge[1] as usize] & bits;
-        while common != 0 {
-            let plane = path.plane(common.trailing_zeros());
-            common &= common - 1;
-            let Some(run) = plane.run_between(a, b, level) else { continue };
-            if run.len() > 2 {
-                let run = Run { points: run, axis: plane.axis, coordinate: plane.coordinate };
-                result.push(Skirt::new(edge, run, a, step));
-            }
-            break;
+    let edges = edges_of(runs, path, mesh, border);
+    let covered = |run: &BorderRun| {
+        let points = run.points(path);
+        if points.len() < 3 {
+            return None;
         }
-    }
-    result
+        let &edge = edges.get(&run.edge(path))?;
+        let plane = path.plane(run.plane());
+        let run = Run { points, axis: plane.axis, coordinate: plane.coordinate };
+        Some(Skirt::new(edge, run, mesh.positions[edge[0] as usize], step))
+    };
+    runs.iter().filter_map(covered).collect()
 }
 
 /// The part of a border's original polyline that is still to be covered, and its plane.

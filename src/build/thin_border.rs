@@ -4,7 +4,7 @@
 //! stay those of a vertex of the same chart. Both sides of a plane do the same, since which
 //! vertices go was decided by the plane ([`super::chain`]).
 
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
 use super::border::{Border, Fate, Path};
 use crate::mesh::{Mesh, PositionKey, key, wide};
@@ -22,26 +22,6 @@ pub fn edge_key(mesh: &Mesh, ends: [u32; 2]) -> EdgeKey {
 /// that has it winds. A mesh that is folded over such an edge has it three times, and ends there
 /// all the same; one that has it twice goes on from there.
 pub fn border_edges(mesh: &Mesh, border: &Border, path: &Path) -> Vec<[u32; 2]> {
-    edges_along(mesh, border, path, |_, uses| uses % 2 == 1)
-}
-
-/// Those of `edges` that a mesh has, each once, as the first triangle that has it winds.
-pub fn edges_among(
-    edges: &FxHashSet<EdgeKey>,
-    mesh: &Mesh,
-    border: &Border,
-    path: &Path,
-) -> Vec<[u32; 2]> {
-    edges_along(mesh, border, path, |edge, _| edges.contains(edge))
-}
-
-/// The edges of a mesh whose ends share a plane, as `choose` likes them and their uses.
-fn edges_along(
-    mesh: &Mesh,
-    border: &Border,
-    path: &Path,
-    choose: impl Fn(&EdgeKey, u32) -> bool,
-) -> Vec<[u32; 2]> {
     let bits = path.bits();
     let mut count: FxHashMap<EdgeKey, (u32, [u32; 2])> = FxHashMap::default();
     if bits == 0 {
@@ -55,11 +35,8 @@ fn edges_along(
             }
         }
     }
-    let mut edges: Vec<[u32; 2]> = count
-        .into_iter()
-        .filter(|(edge, (uses, _))| choose(edge, *uses))
-        .map(|(_, (_, ends))| ends)
-        .collect();
+    let mut edges: Vec<[u32; 2]> =
+        count.into_values().filter(|(uses, _)| uses % 2 == 1).map(|(_, ends)| ends).collect();
     edges.sort_unstable();
     edges
 }
@@ -187,11 +164,5 @@ mod tests {
         assert_eq!(open(&fan(&[2])), [[0, 1]]);
         assert_eq!(open(&fan(&[2, 3])), [[0u32; 2]; 0], "it goes on behind the edge");
         assert_eq!(open(&fan(&[2, 3, 4])), [[0, 1]]);
-
-        let known = [edge_key(&fan(&[2]), [1, 0])].into_iter().collect();
-        for apexes in [&[2][..], &[2, 3], &[2, 3, 4]] {
-            assert_eq!(edges_among(&known, &fan(apexes), &border, &path), [[0, 1]]);
-        }
-        assert!(edges_among(&FxHashSet::default(), &fan(&[2]), &border, &path).is_empty());
     }
 }
