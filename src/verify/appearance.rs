@@ -139,10 +139,7 @@ pub(super) fn level(
     for (squares, compared, tiles) in sums {
         all.0 += squares;
         all.1 += compared;
-        all.2.samples += tiles.samples;
-        all.2.clear += tiles.clear;
-        all.2.wrong += tiles.wrong;
-        all.2.unreadable += tiles.unreadable;
+        all.2.extend(&tiles);
     }
     for (number, _) in below.iter().enumerate().filter(|(_, below)| !**below) {
         add(&mut all, number, leaf_shown[number], 1.0, reference);
@@ -151,13 +148,47 @@ pub(super) fn level(
     (rms, (!reference.tile.is_empty()).then_some(all.2))
 }
 
-/// Tiles that the leaves show.
-pub(super) fn leaf_tiles(shown: &[Option<Color>], reference: &Reference) -> Option<TileFigures> {
-    let mut found = (0.0, 0, TileFigures::default());
-    for (number, &color) in shown.iter().enumerate() {
-        add(&mut found, number, color, 1.0, reference);
+/// Check: the leaves show the tiles that the source shows there.
+pub(super) fn leaf_tiles(
+    scene: &Scene,
+    leaves: &[u32],
+    points: &Points,
+    shown: &[Option<Color>],
+    reference: &Reference,
+    limits: &Limits,
+) -> (TileFigures, Check) {
+    let mut check = Check::new("tiles of the leaves");
+    let mut all = TileFigures::default();
+    let mut demand = |place: &str, tiles: &TileFigures, limit: f64| {
+        let share = tiles.wrong_share().unwrap_or(0.0);
+        if share > limit {
+            let what = format!(
+                "{} of {} samples show another tile ({:.2} %), limit {:.2} %",
+                tiles.wrong,
+                tiles.clear,
+                share * 100.0,
+                limit * 100.0
+            );
+            check.fail(place, what, "texels are misplaced: report this");
+        }
+    };
+    for (place, &leaf) in leaves.iter().enumerate() {
+        let mut found = (0.0, 0, TileFigures::default());
+        for number in points.of_leaf(place) {
+            add(&mut found, number, shown[number], 1.0, reference);
+        }
+        let (_, _, tiles) = found;
+        all.extend(&tiles);
+        if tiles.clear >= FEWEST {
+            demand(&scene.nodes[leaf as usize].file, &tiles, limits.leaf_wrong_tiles);
+        }
     }
-    (!reference.tile.is_empty()).then_some(found.2)
+    demand("all leaves", &all, limits.wrong_tiles);
+    check.summary = format!(
+        "{} of {} samples that are clear of edges show another tile, {} none",
+        all.wrong, all.clear, all.unreadable
+    );
+    (all, check)
 }
 
 fn add(

@@ -6,30 +6,30 @@
 //! then both are joined there, whatever their levels are. Otherwise the gap at the point is the
 //! distance between the places of both sides that are nearest to it.
 //!
-//! A separate part of the surface that a node leaves out altogether has no border at the seam; what
-//! its neighbour still shows of it ends there. That is no gap between borders but an error of the
-//! node, which the distances measure, so such points are counted and left out here. A part is left
-//! out where the node has no vertex at all on the connected run of seam.
+//! Where the source ends near the seam, a node may leave out the strip up to there, and with it its
+//! border ([`super::border`]): then the hole beside it has grown by no more than the node's error,
+//! which the distances measure. Such points are counted and left out here. A surface that goes on
+//! may not be left out.
 //!
 //! Two nodes of one level whose borders were thinned alike meet along a line beside the seam; there
-//! their rims are compared too.
+//! their rims are compared too. Different inputs are built apart from each other, so where they
+//! touch nothing is promised; the widest gap there is told and fails nothing.
 
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
+use super::border::kept;
 use super::geometry::NodeGeometry;
+use super::lines::Lines;
 use super::options::Limits;
 use super::progress::Progress;
 use super::report::{Check, Failure, GapFigures};
-use super::runs::Runs;
 use super::seams::{Seam, rim};
 use super::surface::Surface;
-use super::tree::{apart, is_leaf};
+use super::tree::{apart, input_of, is_leaf, line};
 use crate::format::Scene;
-use crate::mesh::{PositionKey, key};
 
 /// Where along an edge of the seam is looked.
 const PLACES: [f64; 3] = [0.0, 0.5, 1.0];
@@ -41,38 +41,68 @@ struct Meets {
     drawn: DVec3,
     /// The same without triangles in cutting planes.
     bare: DVec3,
-    /// The nearest place of the node's rim, where `drawn` is not at the point itself.
-    rim: DVec3,
-    /// The node leaves out the part that the point belongs to.
-    left_out: bool,
+    /// The node has the border there.
+    kept: bool,
 }
 
-/// Looks at all seams.
+/// What all groups of seams are looked at with.
+struct Look<'a> {
+    scene: &'a Scene,
+    geometry: &'a [NodeGeometry],
+    /// Where the source ends, and the leaf that has each edge.
+    open: &'a [([DVec3; 2], u32)],
+    lines: Lines,
+    steps: &'a [f64],
+    limits: &'a Limits,
+}
+
+impl Look<'_> {
+    /// True where the source ends within the node's error of a point, in a leaf below the node.
+    fn ends_near(&self, node: u32, point: DVec3) -> bool {
+        let reach = self.scene.nodes[node as usize].geometric_error;
+        self.lines.near(point, reach).iter().any(|&(number, _)| {
+            line(self.scene, self.open[number as usize].1).any(|above| above == node)
+        })
+    }
+}
+
+/// What was found at a group of seams.
+#[derive(Default)]
+struct Found {
+    pairs: BTreeMap<[u32; 2], GapFigures>,
+    /// Widest gap between different inputs, metres.
+    between_inputs: f64,
+    failures: Vec<(f64, Failure)>,
+}
+
+/// Looks at all seams; `open` are the edges at which the leaves end.
 pub(super) fn gaps(
     scene: &Scene,
     geometry: &[NodeGeometry],
     seams: &[Seam],
+    open: &[([DVec3; 2], u32)],
     steps: &[f64],
     limits: &Limits,
     progress: &dyn Progress,
 ) -> (Vec<GapFigures>, Check) {
     let mut check = Check::new("gaps");
     progress.phase("gaps", seams.len() as u64);
-    let groups = groups(scene, seams);
-    let found: Vec<(BTreeMap<[u32; 2], GapFigures>, Vec<(f64, Failure)>)> = groups
+    let lines = Lines::new(open.iter().map(|&(ends, _)| ends));
+    let look = Look { scene, geometry, open, lines, steps, limits };
+    let found: Vec<Found> = groups(scene, seams)
         .par_iter()
         .map(|group| {
-            let found = look_at(scene, geometry, group, steps, limits);
+            let found = look.at(group);
             progress.done(group.len() as u64);
             found
         })
         .collect();
-    let mut pairs: BTreeMap<[u32; 2], GapFigures> = BTreeMap::new();
-    let mut widest_first: Vec<(f64, Failure)> = Vec::new();
-    for (figures, failures) in found {
-        widest_first.extend(failures);
-        for (levels, figures) in figures {
-            let all = pairs.entry(levels).or_default();
+    let mut all = Found::default();
+    for found in found {
+        all.failures.extend(found.failures);
+        all.between_inputs = all.between_inputs.max(found.between_inputs);
+        for (levels, figures) in found.pairs {
+            let all = all.pairs.entry(levels).or_default();
             all.points += figures.points;
             all.left_out += figures.left_out;
             all.bare = all.bare.max(figures.bare);
@@ -82,23 +112,26 @@ pub(super) fn gaps(
         }
     }
     // Stable, so that equal ones stay in the order of nodes.
-    widest_first.sort_by(|a, b| b.0.total_cmp(&a.0));
-    check.extend(widest_first.into_iter().map(|(_, failure)| failure));
+    all.failures.sort_by(|a, b| b.0.total_cmp(&a.0));
+    check.extend(all.failures.into_iter().map(|(_, failure)| failure));
     let figures: Vec<GapFigures> =
-        pairs.into_iter().map(|([a, b], figures)| GapFigures { a, b, ..figures }).collect();
+        all.pairs.into_iter().map(|([a, b], figures)| GapFigures { a, b, ..figures }).collect();
     let (points, left_out) =
         figures.iter().fold((0, 0), |(points, out), gap| (points + gap.points, out + gap.left_out));
     let widest = |of: fn(&GapFigures) -> f64| figures.iter().map(of).fold(0.0, f64::max);
     check.summary = format!(
-        "{} edges at cuts, {} pairs of levels, {:.2} % of points on parts left out: widest {:.4} m \
-         without skirts ({:.2} of the node's error), {:.2e} m with them",
+        "{} edges at cuts, {} pairs of levels, {:.2} % of points where the source ends and is left \
+         out: widest {:.4} m without skirts ({:.2} of the node's error), {:.2e} m with them",
         seams.len(),
         figures.len(),
-        100.0 * left_out as f64 / points.max(1) as f64,
+        100.0 * left_out as f64 / (points + left_out).max(1) as f64,
         widest(|gap| gap.bare),
         widest(|gap| gap.bare_relative),
         widest(|gap| gap.open),
     );
+    if all.between_inputs > 0.0 {
+        check.summary += &format!("; {:.4} m between inputs", all.between_inputs);
+    }
     (figures, check)
 }
 
@@ -114,44 +147,39 @@ fn groups<'a>(scene: &Scene, seams: &'a [Seam]) -> Vec<Vec<&'a Seam>> {
     groups.into_values().collect()
 }
 
-fn look_at(
-    scene: &Scene,
-    geometry: &[NodeGeometry],
-    seams: &[&Seam],
-    steps: &[f64],
-    limits: &Limits,
-) -> (BTreeMap<[u32; 2], GapFigures>, Vec<(f64, Failure)>) {
-    let points = |seam: &Seam| PLACES.map(|at| seam.ends[0].lerp(seam.ends[1], at));
-    let sides: Vec<[Vec<u32>; 2]> =
-        seams.iter().map(|seam| apart(scene, seam.leaves[0], seam.leaves[1])).collect();
-    // The seams that each coarse node bounds, and what it does there.
-    let mut of_node: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for (number, sides) in (0..).zip(&sides) {
-        for &node in sides.iter().flatten().filter(|&&node| !is_leaf(scene, node)) {
-            of_node.entry(node).or_default().push(number);
+impl Look<'_> {
+    fn at(&self, seams: &[&Seam]) -> Found {
+        let Self { scene, geometry, steps, limits, .. } = *self;
+        let points = |seam: &Seam| PLACES.map(|at| seam.ends[0].lerp(seam.ends[1], at));
+        let sides: Vec<[Vec<u32>; 2]> =
+            seams.iter().map(|seam| apart(scene, seam.leaves[0], seam.leaves[1])).collect();
+        // The seams that each coarse node bounds, and what it does there.
+        let mut of_node: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for (number, sides) in (0..).zip(&sides) {
+            for &node in sides.iter().flatten().filter(|&&node| !is_leaf(scene, node)) {
+                of_node.entry(node).or_default().push(number);
+            }
         }
-    }
-    let meets: BTreeMap<u32, BTreeMap<u32, [Meets; PLACES.len()]>> = of_node
-        .into_par_iter()
-        .map(|(node, numbers)| {
-            let near = NodeNear::new(&geometry[node as usize]);
-            let tolerance = limits.gap_steps * steps[node as usize];
-            let kept = near.kept(numbers.iter().map(|&number| seams[number as usize]));
-            let meets = numbers.into_iter().zip(kept).map(|(number, kept)| {
-                let meets = |point| Meets { left_out: !kept, ..near.meets(point, tolerance) };
-                (number, points(seams[number as usize]).map(meets))
-            });
-            (node, meets.collect())
-        })
-        .collect();
+        let meets: BTreeMap<u32, NodeAtSeams> = of_node
+            .into_par_iter()
+            .map(|(node, numbers)| {
+                let near = NodeNear::new(&geometry[node as usize]);
+                let own: Vec<&Seam> = numbers.iter().map(|&n| seams[n as usize]).collect();
+                let kept = kept(&geometry[node as usize], &own);
+                let meets = numbers.into_iter().zip(own).zip(kept).map(|((number, seam), kept)| {
+                    (number, points(seam).map(|point| near.meets(point, kept)))
+                });
+                (node, NodeAtSeams { meets: meets.collect(), rim: near.rim })
+            })
+            .collect();
 
-    let mut pairs: BTreeMap<[u32; 2], GapFigures> = BTreeMap::new();
-    let mut failures = Worst::default();
-    let borders = scene.parameters["borders"].as_str().unwrap_or_default();
-    for (number, (seam, [ones, others])) in (0..).zip(seams.iter().zip(&sides)) {
-        let points = points(seam);
-        for &a in ones {
-            for &b in others {
+        let mut found = Found::default();
+        let mut failures = Worst::default();
+        let borders = scene.parameters["borders"].as_str().unwrap_or_default();
+        for (number, (seam, [ones, others])) in (0..).zip(seams.iter().zip(&sides)) {
+            let points = points(seam);
+            let [input, other_input] = seam.leaves.map(|leaf| input_of(scene, leaf));
+            for (&a, &b) in ones.iter().flat_map(|a| others.iter().map(move |b| (a, b))) {
                 if is_leaf(scene, a) && is_leaf(scene, b) {
                     continue;
                 }
@@ -161,44 +189,57 @@ fn look_at(
                 let same_level = level(a) == level(b);
                 let error = error(a).max(error(b));
                 let levels = [level(a).min(level(b)), level(a).max(level(b))];
-                let figures = pairs.entry(levels).or_default();
+                // Without skirts gaps are what was asked for; they must still be within the error.
+                // Even nodes of one level do not quite meet then: where a plane that divides only
+                // the one side meets the seam, only that side keeps the vertex.
+                let allowed = match borders {
+                    "shared" => tolerance + 2.0 * error,
+                    _ => tolerance,
+                };
                 for (place, &point) in points.iter().enumerate() {
                     let at = |node: u32| match meets.get(&node) {
-                        Some(meets) => meets[&number][place],
-                        None => Meets { drawn: point, bare: point, rim: point, left_out: false },
+                        Some(node) => node.meets[&number][place],
+                        None => Meets { drawn: point, bare: point, kept: true },
                     };
                     let (one, other) = (at(a), at(b));
-                    if one.left_out || other.left_out {
+                    let mut open = one.drawn.distance(other.drawn);
+                    if same_level && open > allowed {
+                        let rim = |node: u32| meets.get(&node).map_or(point, |at| at.rim(point));
+                        open = open.min(rim(a).distance(rim(b)));
+                    }
+                    if input != other_input {
+                        found.between_inputs = found.between_inputs.max(open);
+                        continue;
+                    }
+                    let figures = found.pairs.entry(levels).or_default();
+                    let left_out =
+                        |meets: Meets, node: u32| !meets.kept && self.ends_near(node, point);
+                    // Not a number where a node has nothing at all to draw.
+                    let too_wide = open.is_nan() || open > allowed;
+                    if too_wide && (left_out(one, a) || left_out(other, b)) {
                         figures.left_out += 1;
                         continue;
                     }
-                    let bare = one.bare.distance(other.bare);
-                    let mut open = one.drawn.distance(other.drawn);
-                    if same_level {
-                        open = open.min(one.rim.distance(other.rim));
-                    }
                     figures.points += 1;
-                    figures.bare = figures.bare.max(bare);
                     figures.open = figures.open.max(open);
+                    let bare = match one.kept && other.kept {
+                        true => one.bare.distance(other.bare),
+                        false => open,
+                    };
+                    figures.bare = figures.bare.max(bare);
                     if error > 0.0 {
                         figures.bare_relative = figures.bare_relative.max(bare / error);
                         figures.open_relative = figures.open_relative.max(open / error);
                     }
-                    // Without skirts gaps between levels are what was asked for; they must still
-                    // be within the error.
-                    let allowed = match borders {
-                        "shared" if !same_level => tolerance + 2.0 * error,
-                        _ => tolerance,
-                    };
-                    // Not a number where a node has nothing at all to draw.
-                    if open.is_nan() || open > allowed {
+                    if too_wide {
                         failures.note(open, [a, b], point);
                     }
                 }
             }
         }
+        found.failures = failures.into_failures(scene);
+        found
     }
-    (pairs, failures.into_failures(scene))
 }
 
 /// The widest gap of each pair of nodes.
@@ -230,6 +271,27 @@ impl Worst {
     }
 }
 
+/// What a node does at the seams that it bounds.
+struct NodeAtSeams {
+    /// By number of the seam.
+    meets: BTreeMap<u32, [Meets; PLACES.len()]>,
+    rim: Vec<[DVec3; 2]>,
+}
+
+impl NodeAtSeams {
+    /// The place of the node's rim nearest to a point.
+    fn rim(&self, point: DVec3) -> DVec3 {
+        let on_edge = |&[from, to]: &[DVec3; 2]| {
+            let along = to - from;
+            let t = (point - from).dot(along) / along.length_squared();
+            from + along * t.clamp(0.0, 1.0)
+        };
+        self.rim.iter().map(on_edge).fold(DVec3::INFINITY, |best, here| {
+            if point.distance(here) < point.distance(best) { here } else { best }
+        })
+    }
+}
+
 /// A node's surfaces and rim.
 struct NodeNear {
     drawn: Surface,
@@ -245,43 +307,13 @@ impl NodeNear {
         Self {
             drawn: Surface::new(positions(), geometry.triangles.clone()),
             bare: Surface::new(positions(), bare.map(|(_, &triangle)| triangle).collect()),
-            rim: rim(geometry).into_iter().map(|(_, ends)| ends).collect(),
+            rim: rim(geometry).into_iter().map(|edge| edge.ends).collect(),
         }
     }
 
-    /// For each seam, whether the node has a vertex on the connected run that it belongs to.
-    fn kept<'a>(&self, seams: impl Iterator<Item = &'a Seam> + Clone) -> Vec<bool> {
-        let mut numbers: FxHashMap<PositionKey<f64>, u32> = FxHashMap::default();
-        let mut runs = Runs::new(0);
-        let ends = |seam: &Seam| seam.ends.map(|end| key(end.to_array()));
-        for seam in seams.clone() {
-            let [a, b] = ends(seam).map(|end| *numbers.entry(end).or_insert_with(|| runs.push()));
-            runs.join(a, b);
-        }
-        let mut kept = vec![false; numbers.len()];
-        for position in self.drawn.positions() {
-            if let Some(&number) = numbers.get(&key(position.to_array())) {
-                kept[runs.top(number) as usize] = true;
-            }
-        }
-        seams.map(|seam| kept[runs.top(numbers[&ends(seam)[0]]) as usize]).collect()
-    }
-
-    fn meets(&self, point: DVec3, tolerance: f64) -> Meets {
+    fn meets(&self, point: DVec3, kept: bool) -> Meets {
         let nearest =
             |surface: &Surface| surface.closest(point).map_or(DVec3::INFINITY, |hit| hit.point);
-        let drawn = nearest(&self.drawn);
-        if drawn.distance(point) <= tolerance {
-            return Meets { drawn, bare: nearest(&self.bare), rim: drawn, left_out: false };
-        }
-        let on_edge = |&[from, to]: &[DVec3; 2]| {
-            let along = to - from;
-            let t = (point - from).dot(along) / along.length_squared();
-            from + along * t.clamp(0.0, 1.0)
-        };
-        let rim = self.rim.iter().map(on_edge).fold(DVec3::INFINITY, |best, here| {
-            if point.distance(here) < point.distance(best) { here } else { best }
-        });
-        Meets { drawn, bare: nearest(&self.bare), rim, left_out: false }
+        Meets { drawn: nearest(&self.drawn), bare: nearest(&self.bare), kept }
     }
 }

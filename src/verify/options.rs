@@ -60,6 +60,8 @@ pub struct Limits {
     pub leaf_texel_slack: f64,
     /// Share of samples that may show a wrong tile, where tiles can be told.
     pub wrong_tiles: f64,
+    /// Likewise for a single leaf: a few of its samples may lie where JPEG spoiled the number.
+    pub leaf_wrong_tiles: f64,
     /// Gap that counts as none, in steps of the lattice: corners of skirts are rounded to it.
     pub gap_steps: f64,
 }
@@ -75,6 +77,7 @@ impl Default for Limits {
             leaf_texel_ratio: 3.0,
             leaf_texel_slack: 8.0,
             wrong_tiles: 0.01,
+            leaf_wrong_tiles: 0.1,
             gap_steps: 4.0,
         }
     }

@@ -247,9 +247,10 @@ pub struct GapFigures {
     pub a: u32,
     /// Level on the other.
     pub b: u32,
-    /// Points of the cut that were looked at.
+    /// Points of the cut that were compared.
     pub points: u64,
-    /// Of these, points on separate parts that a node leaves out; not counted in what follows.
+    /// Points beside these where the source ends within the node's error and the node leaves out
+    /// what lies before; not counted in what follows.
     pub left_out: u64,
     /// Widest gap that the surfaces leave, cutting planes left out, metres.
     pub bare: f64,

@@ -8,6 +8,8 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::geometry::NodeGeometry;
+use super::tree::input_of;
+use crate::format::Scene;
 use crate::mesh::{PositionKey, key};
 
 /// An edge that two leaves share.
@@ -19,28 +21,36 @@ pub(super) struct Seam {
     pub leaves: [u32; 2],
 }
 
-/// An edge by its ends, in order, and a leaf that it bounds.
-type RimEdge = ([PositionKey<f64>; 2], u32, [DVec3; 2]);
+/// An edge that is not between just two triangles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct RimEdge {
+    /// Its ends, by which edges are ordered and found.
+    keys: [PositionKey<f64>; 2],
+    /// Its ends, in the order of their keys, in source coordinates.
+    pub ends: [DVec3; 2],
+    /// Triangles that have it.
+    uses: u32,
+}
 
-/// Edges on the rim of a node, ends in order of their keys: those that are not between two of its
-/// own triangles.
-pub(super) fn rim(geometry: &NodeGeometry) -> Vec<([PositionKey<f64>; 2], [DVec3; 2])> {
+/// The edges of triangles that are not between just two of them. Vertices at one place are one.
+fn rim_of(
+    positions: impl Iterator<Item = DVec3>,
+    triangles: impl Iterator<Item = [u32; 3]>,
+) -> Vec<RimEdge> {
     let mut numbers: FxHashMap<PositionKey<f64>, u32> = FxHashMap::default();
-    let mut positions: Vec<DVec3> = Vec::new();
-    let welded: Vec<u32> = (0..geometry.positions.len() as u32)
-        .map(|vertex| {
-            let position = geometry.position(vertex);
+    numbers.reserve(positions.size_hint().0);
+    let mut places: Vec<DVec3> = Vec::new();
+    let welded: Vec<u32> = positions
+        .map(|position| {
             *numbers.entry(key(position.to_array())).or_insert_with(|| {
-                positions.push(position);
-                positions.len() as u32 - 1
+                places.push(position);
+                places.len() as u32 - 1
             })
         })
         .collect();
-    let mut edges: Vec<[u32; 2]> = Vec::with_capacity(geometry.triangles.len() * 3);
-    for (number, triangle) in (0..).zip(&geometry.triangles) {
-        if !geometry.is_surface(number) {
-            continue;
-        }
+    drop(numbers);
+    let mut edges: Vec<[u32; 2]> = Vec::with_capacity(triangles.size_hint().0 * 3);
+    for triangle in triangles {
         let [a, b, c] = triangle.map(|vertex| welded[vertex as usize]);
         edges.extend([[a, b], [b, c], [c, a]].map(|[from, to]| [from.min(to), from.max(to)]));
     }
@@ -49,41 +59,85 @@ pub(super) fn rim(geometry: &NodeGeometry) -> Vec<([PositionKey<f64>; 2], [DVec3
         .chunk_by(|a, b| a == b)
         .filter(|same| same.len() != 2 && same[0][0] != same[0][1])
         .map(|same| {
-            let mut ends = same[0].map(|vertex| positions[vertex as usize]);
+            let mut ends = same[0].map(|vertex| places[vertex as usize]);
             let mut keys = ends.map(|end| key(end.to_array()));
             if keys[1] < keys[0] {
                 (keys, ends) = ([keys[1], keys[0]], [ends[1], ends[0]]);
             }
-            (keys, ends)
+            RimEdge { keys, ends, uses: same.len() as u32 }
         })
         .collect()
 }
 
-/// All edges that several leaves share, once for each pair of leaves, in a fixed order.
-pub(super) fn seams(leaves: &[u32], geometry: &[NodeGeometry]) -> Vec<Seam> {
-    let mut edges: Vec<RimEdge> = leaves
-        .par_iter()
-        .flat_map_iter(|&leaf| {
-            rim(&geometry[leaf as usize]).into_iter().map(move |(keys, ends)| (keys, leaf, ends))
-        })
-        .collect();
-    edges.par_sort_unstable_by_key(|&(keys, leaf, _)| (keys, leaf));
-    let mut seams = Vec::new();
-    for same in edges.chunk_by(|a, b| a.0 == b.0) {
-        for (place, &(_, a, ends)) in same.iter().enumerate() {
-            for &(_, b, _) in &same[place + 1..] {
-                if a != b {
-                    seams.push(Seam { ends, leaves: [a, b] });
+/// The rim of a node, triangles in cutting planes left out.
+pub(super) fn rim(geometry: &NodeGeometry) -> Vec<RimEdge> {
+    let positions = (0..geometry.positions.len() as u32).map(|vertex| geometry.position(vertex));
+    let triangles = (0..).zip(&geometry.triangles);
+    let surface = triangles.filter(|&(number, _)| geometry.is_surface(number));
+    rim_of(positions, surface.map(|(_, &triangle)| triangle))
+}
+
+/// The edges at which a surface ends: those that an odd number of its triangles have.
+pub(super) fn open_edges(
+    positions: &[DVec3],
+    triangles: impl Iterator<Item = [u32; 3]>,
+) -> Vec<[DVec3; 2]> {
+    let rim = rim_of(positions.iter().copied(), triangles);
+    rim.into_iter().filter(|edge| edge.uses % 2 == 1).map(|edge| edge.ends).collect()
+}
+
+/// The rims of all leaves, equal edges side by side, in a fixed order.
+pub(super) struct Rims<'a> {
+    scene: &'a Scene,
+    edges: Vec<(RimEdge, u32)>,
+}
+
+impl<'a> Rims<'a> {
+    /// Of these leaves.
+    pub fn new(scene: &'a Scene, leaves: &[u32], geometry: &[NodeGeometry]) -> Self {
+        let rim = |&leaf: &u32| rim(&geometry[leaf as usize]).into_iter().map(move |e| (e, leaf));
+        let mut edges: Vec<(RimEdge, u32)> = leaves.par_iter().flat_map_iter(rim).collect();
+        edges.par_sort_unstable_by_key(|&(edge, leaf)| (edge.keys, leaf));
+        Self { scene, edges }
+    }
+
+    fn equal(&self) -> impl Iterator<Item = &[(RimEdge, u32)]> {
+        self.edges.chunk_by(|a, b| a.0.keys == b.0.keys)
+    }
+
+    /// All edges that several leaves share, once for each pair of leaves.
+    pub fn seams(&self) -> Vec<Seam> {
+        let mut seams = Vec::new();
+        for same in self.equal() {
+            for (place, &(edge, a)) in same.iter().enumerate() {
+                let others = same[place + 1..].iter().filter(|&&(_, b)| a != b);
+                seams.extend(others.map(|&(_, b)| Seam { ends: edge.ends, leaves: [a, b] }));
+            }
+        }
+        seams
+    }
+
+    /// The edges at which the leaves of an input end, all together, and a leaf that has each.
+    pub fn open(&self) -> Vec<([DVec3; 2], u32)> {
+        let mut open = Vec::new();
+        for same in self.equal() {
+            for &(edge, leaf) in same.iter().filter(|(edge, _)| edge.uses % 2 == 1) {
+                let input = input_of(self.scene, leaf);
+                let of_input =
+                    same.iter().filter(|&&(_, other)| input_of(self.scene, other) == input);
+                if of_input.map(|(edge, _)| edge.uses).sum::<u32>() % 2 == 1 {
+                    open.push((edge.ends, leaf));
                 }
             }
         }
+        open
     }
-    seams
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::test_scene::scene;
 
     fn square(origin: f64, from: f32) -> NodeGeometry {
         NodeGeometry {
@@ -103,8 +157,24 @@ mod tests {
     fn leaves_with_different_origins_meet_at_equal_edges() {
         let nodes = [square(100.0, 0.0), square(101.0, 0.0), square(102.0, 0.5)];
         assert_eq!(rim(&nodes[0]).len(), 4, "the diagonal is inside");
-        let seams = seams(&[0, 1, 2], &nodes);
+        let mut scene = scene();
+        scene.nodes.iter_mut().for_each(|node| node.block = Some(0));
+        let rims = Rims::new(&scene, &[0, 1, 2], &nodes);
         let x = DVec3::new(101.0, 0.0, 0.0);
-        assert_eq!(seams, [Seam { ends: [x, x + DVec3::Y], leaves: [0, 1] }]);
+        assert_eq!(rims.seams(), [Seam { ends: [x, x + DVec3::Y], leaves: [0, 1] }]);
+        // Three squares have twelve sides; two of them meet.
+        let open = rims.open();
+        assert_eq!(open.len(), 10);
+        assert!(open.iter().all(|(ends, _)| *ends != [x, x + DVec3::Y]));
+        let corners: Vec<DVec3> = (0..4).map(|vertex| nodes[1].position(vertex)).collect();
+        assert_eq!(open_edges(&corners, nodes[1].triangles.iter().copied()).len(), 4);
+
+        // Two inputs that touch end there, each for itself.
+        scene.blocks[1].input = "other.obj".into();
+        scene.nodes[1].block = Some(1);
+        assert_eq!(
+            Rims::new(&scene, &[1, 2], &[&nodes[..1], &nodes[..2]].concat()).open().len(),
+            8
+        );
     }
 }

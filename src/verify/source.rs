@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::look::Look;
 use super::progress::Progress;
+use super::seams::open_edges;
 use super::surface::Surface;
 use crate::import::{find_inputs, load};
 use crate::mesh::{Model, TextureSource};
@@ -66,6 +68,31 @@ impl Source {
     /// The files, as given or found.
     pub fn names(&self) -> Vec<String> {
         self.models.iter().map(|model| model.source.to_string_lossy().into_owned()).collect()
+    }
+
+    /// The edges at which each model ends, model by model: those that touch are not one surface.
+    pub fn open_edges(&self) -> Vec<[DVec3; 2]> {
+        let first = |model: u32| {
+            let place = self.parts.partition_point(|place| place.model < model);
+            self.parts
+                .get(place)
+                .map_or((self.surface.positions().len(), self.surface.triangles().len()), |place| {
+                    (place.first_vertex as usize, place.first_triangle as usize)
+                })
+        };
+        let models: Vec<u32> = (0..self.models.len() as u32).collect();
+        let edges: Vec<Vec<[DVec3; 2]>> = models
+            .into_par_iter()
+            .map(|model| {
+                let ((vertex, triangle), (vertices, triangles)) = (first(model), first(model + 1));
+                let corners = self.surface.triangles()[triangle..triangles].iter();
+                open_edges(
+                    &self.surface.positions()[vertex..vertices],
+                    corners.map(|corners| corners.map(|corner| corner - vertex as u32)),
+                )
+            })
+            .collect();
+        edges.concat()
     }
 
     /// How the surface looks at a point of a triangle.

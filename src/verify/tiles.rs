@@ -97,6 +97,14 @@ pub(super) fn count(figures: &mut TileFigures, tile: &Tile, shown: Color, scale:
 }
 
 impl TileFigures {
+    /// Takes over all of another.
+    pub(super) fn extend(&mut self, other: &Self) {
+        self.samples += other.samples;
+        self.clear += other.clear;
+        self.wrong += other.wrong;
+        self.unreadable += other.unreadable;
+    }
+
     /// Share of the clear samples that show another tile; `None` where none is clear.
     pub fn wrong_share(&self) -> Option<f64> {
         (self.clear > 0).then(|| self.wrong as f64 / self.clear as f64)

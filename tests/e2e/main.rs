@@ -14,3 +14,4 @@ mod paths;
 mod real_data;
 mod soups;
 mod verify;
+mod verify_surface;

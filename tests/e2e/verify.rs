@@ -18,21 +18,24 @@ use tempfile::TempDir;
 use crate::support::hlod_build;
 use crate::support::inputs::{small_city, write_city};
 
-/// A city and its scene, built once; tests break copies.
-struct Sound {
-    folder: TempDir,
+/// A city and its scenes, one for each treatment of borders, built once; tests break copies.
+pub struct Sound {
+    /// Holds them, each named after its treatment.
+    pub folder: TempDir,
     source: PathBuf,
 }
 
-static SOUND: LazyLock<Sound> = LazyLock::new(|| {
+pub static SOUND: LazyLock<Sound> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let source = write_city(folder.path(), &CityOptions { triangles: 12_000, ..small_city() });
     // By a relative path: ids of nodes depend on it, and what verify draws depends on ids.
-    hlod_build()
-        .current_dir(&folder)
-        .args(["--quiet", "--borders", "locked", "--desired-tris", "300", "city.obj", "locked"])
-        .assert()
-        .success();
+    for borders in ["locked", "shared", "skirts"] {
+        hlod_build()
+            .current_dir(&folder)
+            .args(["--quiet", "--borders", borders, "--desired-tris", "300", "city.obj", borders])
+            .assert()
+            .success();
+    }
     Sound { folder, source }
 });
 
@@ -40,24 +43,24 @@ fn options() -> VerifyOptions {
     VerifyOptions { samples: 40_000, ..VerifyOptions::default() }
 }
 
-fn report(out: &Path, with_source: bool) -> VerifyReport {
+pub fn report(out: &Path, with_source: bool) -> VerifyReport {
     let sources: &[PathBuf] = if with_source { std::slice::from_ref(&SOUND.source) } else { &[] };
     verify(out, sources, &options(), &Silent).unwrap()
 }
 
-fn failed(report: &VerifyReport) -> Vec<&'static str> {
+pub fn failed(report: &VerifyReport) -> Vec<&'static str> {
     let checks = report.checks.iter().filter(|check| !check.passed);
     checks.map(|check| check.name).collect()
 }
 
 /// A copy of a sound scene to break.
-struct Broken {
-    out: TempDir,
-    scene: Scene,
+pub struct Broken {
+    pub out: TempDir,
+    pub scene: Scene,
 }
 
 impl Broken {
-    fn new(of: &str) -> Self {
+    pub fn new(of: &str) -> Self {
         let out = tempfile::tempdir().unwrap();
         let from = SOUND.folder.path().join(of);
         fs::create_dir(out.path().join(NODES_DIR)).unwrap();
@@ -70,18 +73,18 @@ impl Broken {
         Self { out, scene }
     }
 
-    fn file(&self, node: usize) -> PathBuf {
+    pub fn file(&self, node: usize) -> PathBuf {
         self.out.path().join(NODES_DIR).join(&self.scene.nodes[node].file)
     }
 
     /// The first node that is a leaf, or is not.
-    fn node(&self, leaf: bool) -> usize {
+    pub fn node(&self, leaf: bool) -> usize {
         let fits = |node: &hlod::format::Node| node.first_child.is_none() == leaf;
         self.scene.nodes.iter().position(fits).unwrap()
     }
 
     /// Changes a node's file, and what the scene says of it accordingly.
-    fn rewrite(&mut self, number: usize, edit: impl FnOnce(&mut NodeMesh)) {
+    pub fn rewrite(&mut self, number: usize, edit: impl FnOnce(&mut NodeMesh)) {
         let path = self.file(number);
         let mut mesh = read_glb(&fs::read(&path).unwrap(), &path).unwrap();
         edit(&mut mesh);
@@ -101,12 +104,12 @@ impl Broken {
         node.average_normal = found.average_normal.map(|c| c as f32);
     }
 
-    fn report(&self, with_source: bool) -> VerifyReport {
+    pub fn report(&self, with_source: bool) -> VerifyReport {
         fs::write(self.out.path().join(SCENE_FILE), self.scene.to_bytes().unwrap()).unwrap();
         report(self.out.path(), with_source)
     }
 
-    fn failed(&self) -> Vec<&'static str> {
+    pub fn failed(&self) -> Vec<&'static str> {
         failed(&self.report(true))
     }
 }
@@ -189,7 +192,7 @@ fn errors_that_are_far_too_large() {
 }
 
 /// Of a node, the first picture, decoded, changed and encoded again.
-fn repaint(mesh: &mut NodeMesh, paint: impl FnOnce(&mut image::RgbImage)) {
+pub fn repaint(mesh: &mut NodeMesh, paint: impl FnOnce(&mut image::RgbImage)) {
     let image = &mut mesh.images[0];
     let NodeImageData::Embedded { bytes, .. } = &mut image.data else { panic!("not its own") };
     let mut picture = image::load_from_memory(bytes).unwrap().to_rgb8();
@@ -201,7 +204,7 @@ fn repaint(mesh: &mut NodeMesh, paint: impl FnOnce(&mut image::RgbImage)) {
     *bytes = encoded;
 }
 
-fn textured_leaf(broken: &Broken) -> usize {
+pub fn textured_leaf(broken: &Broken) -> usize {
     let nodes = &broken.scene.nodes;
     let fits = |n: &hlod::format::Node| n.first_child.is_none() && n.textured_triangles > 100;
     nodes.iter().position(fits).unwrap()
