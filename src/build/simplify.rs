@@ -230,7 +230,8 @@ fn collapse(
 
 /// Makes one part of all parts that touch a border: they go on beyond it, so how small they look
 /// here says nothing, and where the neighbour keeps its part of one there would be a hole. They go
-/// only where all of them together look small. Joined by triangles without area, which take part in nothing but the search for parts.
+/// only where all of them together look small. Joined by triangles without area, which take part in
+/// nothing but the search for parts.
 fn join_locked(indices: &mut Vec<u32>, locked: &[bool]) {
     let mut locked = (0..).zip(locked).filter(|(_, locked)| **locked).map(|(vertex, _)| vertex);
     let Some(first) = locked.next() else { return };
