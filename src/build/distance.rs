@@ -3,13 +3,16 @@
 //! The Hausdorff distance obeys the triangle inequality, so the distances between a node and its
 //! children's meshes, summed down to the leaves, bound the distance to the original.
 //!
-//! It is measured at all vertices of both meshes and at the centres of all triangles, those of
-//! larger ones in parts of about the average size, so that what is missing between vertices is
-//! found as well: where a triangle alone is missing, the point of it that is farthest from its
-//! sides is at most 1.5 times as far as its centre (three times the longest side over the
-//! perimeter). Only the largest distance counts: of most points it is enough to know that they are
-//! not farther than another one, which the first triangle at hand shows. What lies between the
-//! points is covered by [`ALLOWANCE`].
+//! It is measured at all vertices of both meshes and at the centres of all triangles, of which the
+//! largest are divided again and again. Only the largest distance counts: of most points it is
+//! enough to know that they are not farther than another one, which the first triangle at hand
+//! shows. Once no part reaches farther from its centre than that largest distance, no point between
+//! can be more than twice as far, and [`ALLOWANCE`] makes the result a bound. Where a surface comes
+//! back so exactly that this would take too many divisions, what is left is covered by likelihood
+//! alone.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 use glam::Vec3;
 
@@ -19,8 +22,10 @@ use crate::mesh::Mesh;
 /// one of those that are measured.
 pub const ALLOWANCE: f64 = 2.0;
 
-/// How often a triangle is divided into four at most.
-const MOST_DIVISIONS: u32 = 5;
+/// Parts of triangles are divided at most this often in a direction, or once for so many triangles,
+/// whichever is more.
+const LEAST_DIVISIONS: usize = 512;
+const TRIANGLES_PER_DIVISION: usize = 4;
 
 /// Points that are tried in each direction for the mean; evenly spread over the triangles.
 const MOST_SAMPLES: usize = 320;
@@ -60,6 +65,61 @@ fn mean_one_way(from: &Mesh, to: &Mesh) -> f64 {
     }
     if weights > 0.0 { sum / weights } else { 0.0 }
 }
+
+/// A triangle or a part of one.
+struct Part {
+    corners: [Vec3; 3],
+    centre: Vec3,
+    /// How far its farthest corner is from its centre.
+    reach: f32,
+}
+
+impl Part {
+    fn new(corners: [Vec3; 3]) -> Self {
+        let centre = (corners[0] + corners[1] + corners[2]) * (1.0 / 3.0);
+        let squared = corners.map(|corner| corner.distance_squared(centre));
+        let reach = squared[0].max(squared[1]).max(squared[2]).sqrt();
+        Self { corners, centre, reach }
+    }
+
+    /// The middle of its longest side, and its halves on both sides of that.
+    fn divided(&self) -> (Vec3, [[Vec3; 3]; 2]) {
+        let [a, b, c] = self.corners;
+        let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(a, b)| a.distance_squared(b));
+        let (a, b, c) = if ab >= bc && ab >= ca {
+            (a, b, c)
+        } else if bc >= ca {
+            (b, c, a)
+        } else {
+            (c, a, b)
+        };
+        let middle = (a + b) * 0.5;
+        (middle, [[a, middle, c], [middle, b, c]])
+    }
+}
+
+/// By reach; equal ones by their centres, so that the order is always the same.
+impl Ord for Part {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let order = |part: &Self| [part.reach, part.centre.x, part.centre.y, part.centre.z];
+        let pairs = order(self).into_iter().zip(order(other));
+        pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+    }
+}
+
+impl PartialOrd for Part {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Part {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Part {}
 
 /// Triangles in a uniform grid over their bounding box.
 struct TriangleGrid {
@@ -144,18 +204,20 @@ impl TriangleGrid {
     }
 
     /// The farthest of the vertices of `mesh` and of points on its triangles, or `least` where none
-    /// is farther.
+    /// is farther. No point of it is more than twice as far, as far as divisions go.
     fn farthest(&self, mesh: &Mesh, least: f32) -> f32 {
-        let mut worst = least;
         // The triangle that was near enough to the point before: mostly it is to the next one too.
-        let mut last = 0;
+        let (mut largest, mut last) = (least, 0);
+        // Returns the largest distance so far.
         let mut measure = |point: Vec3| {
             let [a, b, c] = self.triangles[last as usize];
-            if squared_distance(point, a, b, c) > worst * worst {
-                let (distance, nearest) = self.search(point, worst);
-                (worst, last) = (worst.max(distance), nearest);
+            if squared_distance(point, a, b, c) > largest * largest {
+                let (distance, nearest) = self.search(point, largest);
+                (largest, last) = (largest.max(distance), nearest);
             }
+            largest
         };
+        let mut worst = least;
         let corners = |triangle: [u32; 3]| triangle.map(|v| Vec3::from(mesh.positions[v as usize]));
         // Scouts, evenly spread, find about how large the largest is; the others need then hardly
         // be looked at.
@@ -164,28 +226,29 @@ impl TriangleGrid {
             let [a, b, c] = corners(triangle);
             measure((a + b + c) * (1.0 / 3.0));
         }
-        mesh.positions.iter().for_each(|&position| measure(position.into()));
-        let squared_area =
-            |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a).length_squared().min(f32::MAX);
-        let areas = mesh.triangles.iter().map(|&triangle| squared_area(corners(triangle)).sqrt());
-        let mean = areas.sum::<f32>() / mesh.triangles.len() as f32;
-        let mut parts: Vec<([Vec3; 3], u32)> = Vec::new();
+        for &position in &mesh.positions {
+            measure(position.into());
+        }
+        // Parts that reach farther from their centre than the largest distance, largest first.
+        let mut parts = BinaryHeap::new();
         for &triangle in &mesh.triangles {
-            // Each quarter has a sixteenth of the squared area.
-            let whole = corners(triangle);
-            let (mut left, mut divisions) = (squared_area(whole), 0);
-            while left > 4.0 * mean * mean && divisions < MOST_DIVISIONS {
-                (left, divisions) = (left / 16.0, divisions + 1);
+            let part = Part::new(corners(triangle));
+            worst = measure(part.centre);
+            if part.reach > worst {
+                parts.push(part);
             }
-            parts.push((whole, divisions));
-            while let Some(([a, b, c], divisions)) = parts.pop() {
-                if divisions == 0 {
-                    measure((a + b + c) * (1.0 / 3.0));
-                    continue;
+        }
+        for _ in 0..(mesh.triangles.len() / TRIANGLES_PER_DIVISION).max(LEAST_DIVISIONS) {
+            let Some(part) = parts.pop().filter(|part| part.reach > worst) else { break };
+            let (middle, halves) = part.divided();
+            // An edge may lie outside of the other mesh's outline where its ends do not.
+            measure(middle);
+            for half in halves {
+                let half = Part::new(half);
+                worst = measure(half.centre);
+                if half.reach > worst {
+                    parts.push(half);
                 }
-                let (ab, bc, ca) = ((a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5);
-                let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
-                parts.extend(quarters.map(|quarter| (quarter, divisions - 1)));
             }
         }
         worst
