@@ -1,10 +1,13 @@
 //! Replays camera paths over a built scene and logs what a user would have felt.
 
+mod accuracy;
 mod clock;
 mod compare;
 mod model;
 mod options;
 mod record;
+#[cfg(feature = "render")]
+mod reference;
 mod replay;
 mod report;
 mod session;
@@ -16,14 +19,17 @@ mod tests;
 mod wall;
 mod write;
 
+pub use accuracy::{Accuracy, ReferenceContext, Sighting, Witness, WorstFrame};
 pub use clock::{CLOCK_FILE_VERSION, ClockConstants};
 pub use compare::{
-    Bytes, Comparison, Count, Dimension, Limit, Limits, Milliseconds, Points, Row, SummaryFile,
-    Unit, compare,
+    Bytes, Comparison, Count, Dimension, Flip, Limit, Limits, Milliseconds, Points, Row,
+    SummaryFile, Unit, compare,
 };
 pub use model::ModelWorld;
 pub use options::{BenchOptions, Pace, Size};
 pub use record::FrameRecord;
+#[cfg(feature = "render")]
+pub use reference::{Painter, Reference};
 pub use replay::{Drawn, Replay, Run, World, run};
 pub use report::report_html;
 pub use session::Session;

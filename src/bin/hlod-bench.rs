@@ -185,6 +185,10 @@ struct RunArgs {
     /// Write every Nth frame as PNG into DIR/snapshots, N 1 or more
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Drawing")]
     snapshots: Option<u64>,
+    /// Draw every Nth frame from the leaves too, outside of its time, and log how far it is from
+    /// that: FLIP, PSNR, SSIM, gaps, and the pop where levels toggled. N 1 or more
+    #[arg(long, value_name = "N", conflicts_with = "show_levels", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Drawing")]
+    reference_every: Option<u64>,
     /// Tint nodes by level
     #[arg(long, help_heading = "Drawing")]
     show_levels: bool,
@@ -349,13 +353,7 @@ fn replay(arguments: &RunArgs) -> Result<()> {
     options.check()?;
     check_output(&arguments.out)?;
     let bar = Bar::new(arguments.quiet, path.frames.len());
-    let (run, mut context) = match arguments.clock {
-        Clock::Model => {
-            let constants = constants.unwrap_or_default();
-            session.run_model(&path, options, constants, |frame| bar.frame(frame))?
-        }
-        Clock::Wall => run_wall(arguments, &session, &path, options, constants, &bar)?,
-    };
+    let (run, mut context) = run(arguments, &session, &path, options, constants, &bar)?;
     bar.bar.finish_and_clear();
     context.path_name = path_name;
     let summary = summary(&run, &context);
@@ -380,7 +378,7 @@ fn replay(arguments: &RunArgs) -> Result<()> {
 }
 
 #[cfg(feature = "render")]
-fn run_wall(
+fn run(
     arguments: &RunArgs,
     session: &Session,
     path: &CameraPath,
@@ -388,8 +386,9 @@ fn run_wall(
     constants: Option<ClockConstants>,
     bar: &Bar,
 ) -> Result<(Run, Context)> {
+    use hlod::bench::{Reference, Snapshots, Witness};
     use hlod::render::{RenderOptions, Renderer, Shading};
-    let mut renderer = Renderer::new(&RenderOptions {
+    let render = RenderOptions {
         size: options.size.0,
         adapter: arguments.adapter.clone(),
         shading: match arguments.shading {
@@ -400,11 +399,33 @@ fn run_wall(
         show_levels: arguments.show_levels,
         cull: arguments.cull,
         ..RenderOptions::default()
-    })?;
-    let snapshots = arguments
-        .snapshots
-        .map(|every| hlod::bench::Snapshots { every, dir: arguments.out.join("snapshots") });
-    session.run_wall(path, options, constants, &mut renderer, snapshots, |frame| bar.frame(frame))
+    };
+    let reference = |every| Reference::new(session, &render, every);
+    let mut reference = arguments.reference_every.map(reference).transpose()?;
+    let witness = reference.as_mut().map(|reference| reference as &mut dyn Witness);
+    let progress = |frame: &FrameRecord| bar.frame(frame);
+    let (run, mut context) = match arguments.clock {
+        Clock::Model => {
+            let constants = constants.unwrap_or_default();
+            session.run_model(path, options, constants, witness, progress)?
+        }
+        Clock::Wall => {
+            let mut renderer = Renderer::new(&render)?;
+            let dir = arguments.out.join("snapshots");
+            let snapshots = arguments.snapshots.map(|every| Snapshots { every, dir });
+            session.run_wall(
+                path,
+                options,
+                constants,
+                &mut renderer,
+                snapshots,
+                witness,
+                progress,
+            )?
+        }
+    };
+    context.reference = reference.map(Reference::context).transpose()?;
+    Ok((run, context))
 }
 
 #[cfg(feature = "render")]
@@ -432,15 +453,19 @@ fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Res
 }
 
 #[cfg(not(feature = "render"))]
-fn run_wall(
-    _: &RunArgs,
-    _: &Session,
-    _: &CameraPath,
-    _: BenchOptions,
-    _: Option<ClockConstants>,
-    _: &Bar,
+fn run(
+    arguments: &RunArgs,
+    session: &Session,
+    path: &CameraPath,
+    options: BenchOptions,
+    constants: Option<ClockConstants>,
+    bar: &Bar,
 ) -> Result<(Run, Context)> {
-    Err(cannot_draw())
+    if arguments.clock == Clock::Wall || arguments.reference_every.is_some() {
+        return Err(cannot_draw());
+    }
+    let constants = constants.unwrap_or_default();
+    session.run_model(path, options, constants, None, |frame| bar.frame(frame))
 }
 
 #[cfg(not(feature = "render"))]
@@ -450,7 +475,7 @@ fn calibrate(_: &Path, _: Option<String>, _: Size, _: &Path) -> Result<()> {
 
 #[cfg(not(feature = "render"))]
 fn cannot_draw() -> Error {
-    Error::NoAdapter("this hlod-bench was compiled without drawing; use --clock model".into())
+    Error::NoAdapter("this hlod-bench was compiled without drawing; use --clock model alone".into())
 }
 
 /// Progress on a terminal, and nothing elsewhere.

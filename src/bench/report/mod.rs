@@ -1,5 +1,6 @@
 //! A run as a page that a person can read: `report.html`, which needs nothing beside itself.
 
+mod accuracy;
 mod decimate;
 mod detail;
 mod estimate;
@@ -52,6 +53,7 @@ pub fn report_html(run: &Run, context: &Context, summary: &Value) -> Result<Stri
                 }
                 (summary_tables(summary))
                 @for section in &sections { (section) }
+                @if let Some(reference) = &context.reference { (accuracy::worst(reference)) }
                 h2 { "Options" }
                 (options(context, summary))
             }

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use image::RgbaImage;
+
 use super::{Snapshots, process};
 use crate::bench::replay::lock;
 use crate::bench::{Drawn, World};
@@ -95,7 +97,7 @@ fn report(broken: &mut Vec<String>, error: &Error) {
 }
 
 /// Metres of the nearest that is seen: a hand's breadth, and less in scenes of a few metres.
-pub(super) fn near_plane(tree: &SceneTree) -> f32 {
+pub(in crate::bench) fn near_plane(tree: &SceneTree) -> f32 {
     ((tree.diagonal() * 1e-4) as f32).clamp(1e-6, 0.1)
 }
 
@@ -167,6 +169,13 @@ impl World for WallWorld<'_> {
             Some(snapshots) => snapshots.take(frame, self.renderer),
             None => Ok(()),
         }
+    }
+
+    fn aside(&mut self, look: &mut dyn FnMut(Option<RgbaImage>) -> Result<()>) -> Result<()> {
+        let still = self.thread.as_ref().map(LoadingThread::still).transpose()?;
+        let done = look(Some(self.renderer.surface()?));
+        drop(still);
+        done
     }
 
     fn process_bytes(&mut self) -> u64 {
