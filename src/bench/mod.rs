@@ -13,6 +13,7 @@ mod report;
 mod session;
 mod statistics;
 mod summary;
+mod sweep;
 #[cfg(test)]
 mod tests;
 #[cfg(feature = "render")]
@@ -34,6 +35,7 @@ pub use replay::{Drawn, Replay, Run, World, run};
 pub use report::report_html;
 pub use session::Session;
 pub use summary::{Context, SUMMARY_VERSION, summary, summary_text};
+pub use sweep::Sweep;
 #[cfg(feature = "render")]
 pub use wall::{Snapshots, WallWorld, calibrate, measure_start};
 pub use write::{check_output, write_run};

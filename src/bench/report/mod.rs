@@ -9,6 +9,7 @@ mod frame_time;
 mod memory;
 mod plot;
 mod series;
+mod sweep;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -21,6 +22,7 @@ use serde_json::Value;
 use super::{Context, Run};
 use crate::Result;
 use figures::{Figure, Section, sections};
+pub use sweep::sweep_html;
 
 const STYLE: &str = include_str!("style.css");
 

@@ -1,19 +1,20 @@
 //! `hlod-bench OUT PATH.csv`: arguments in, exit code out.
 
+mod run_args;
+
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Parser, Subcommand};
 use hlod::bench::{
-    BenchOptions, ClockConstants, Context, FrameRecord, Limits, Pace, Run, Session, Size,
-    SummaryFile, check_output, compare, summary, summary_text, write_run,
+    BenchOptions, ClockConstants, Context, FrameRecord, Limits, Run, Session, Size, SummaryFile,
+    Sweep, check_output, compare, summary, summary_text, write_run,
 };
 use hlod::camera::{self, CameraPath, DEFAULT_FPS, Ground, PathKind};
-use hlod::runtime::lakhia::{LakhiaOptions, ShareFeedback, StartOfHysteresis};
-use hlod::runtime::residency::ResidencyOptions;
 use hlod::{Error, Result};
 use indicatif::{ProgressBar, ProgressStyle};
+use run_args::{Clock, RunArgs, parse_size};
 
 /// Replays a camera path over a built scene and logs what a user would have felt.
 ///
@@ -26,7 +27,7 @@ use indicatif::{ProgressBar, ProgressStyle};
     allow_negative_numbers = true,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    override_usage = "hlod-bench [OPTIONS] OUT PATH.csv\n       hlod-bench make-path [OPTIONS] OUT --kind KIND --out PATH.csv\n       hlod-bench calibrate [OPTIONS] OUT --out CLOCK.json\n       hlod-bench compare [OPTIONS] BASE.json NEW.json",
+    override_usage = "hlod-bench [OPTIONS] OUT PATH.csv\n       hlod-bench make-path [OPTIONS] OUT --kind KIND --out PATH.csv\n       hlod-bench calibrate [OPTIONS] OUT --out CLOCK.json\n       hlod-bench sweep [OPTIONS] OUT PATH.csv --targets MS,MS\n       hlod-bench compare [OPTIONS] BASE.json NEW.json",
     after_help = "Examples:\n  hlod-bench make-path out/ --kind walk --out walk.csv\n  hlod-bench out/ walk.csv --target-ms 30\n  hlod-bench out/ walk.csv --clock model --max-memory 256MiB --out bench/walk\n\nExit codes: 0 success, 1 internal error, 2 usage, 3 input missing or invalid (also where a run went on without a node file that cannot be used), 4 output not written, 5 no graphics adapter, 6 compare: a limit was exceeded."
 )]
 struct Cli {
@@ -75,6 +76,16 @@ enum Command {
         #[command(flatten)]
         limits: Box<Limits>,
     },
+    /// Replays a path at several targets: image error against frame time, in sweep.csv and
+    /// sweep.html, beside a folder for each run
+    Sweep {
+        /// Milliseconds that a frame may take, above 0, one run each
+        #[arg(long, value_name = "MS,MS", value_delimiter = ',', default_value = "5,10,20,30,60")]
+        targets: Vec<f64>,
+        /// As for one run; --reference-every is 10 unless given
+        #[command(flatten)]
+        run: Box<RunArgs>,
+    },
     /// Measures the constants of the model clock on this machine
     Calibrate {
         /// The output folder of hlod-build
@@ -89,189 +100,6 @@ enum Command {
         #[arg(long, value_name = "CLOCK.json")]
         out: PathBuf,
     },
-}
-
-#[derive(Args, Debug)]
-struct RunArgs {
-    /// The output folder of hlod-build
-    #[arg(required = true)]
-    scene: Option<PathBuf>,
-    /// The path: frame,time_s,x,y,z,qx,qy,qz,qw,fov_y_deg
-    #[arg(required = true, value_name = "PATH.csv")]
-    path: Option<PathBuf>,
-    /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "bench")]
-    out: PathBuf,
-    /// `wall` draws and measures; `model` takes times from a model, needs no graphics adapter and
-    /// gives the same on every machine
-    #[arg(long, value_enum, default_value_t = Clock::Wall)]
-    clock: Clock,
-    /// Constants that `calibrate` wrote [default: wall: measured at the start; model: built in]
-    #[arg(long, value_name = "CLOCK.json")]
-    constants: Option<PathBuf>,
-    /// `recorded`: a frame begins no sooner than the path has it; `unthrottled`: at once
-    #[arg(long, value_enum, default_value_t = Pace::Recorded)]
-    pace: Pace,
-    /// Frames for which the camera stands at the first pose before the log begins
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    settle_frames: u64,
-    /// Print nothing but errors
-    #[arg(long, short)]
-    quiet: bool,
-
-    /// c_targetTime: milliseconds that a frame may take, above 0
-    #[arg(long, value_name = "MS", default_value_t = 30.0, help_heading = "Selection")]
-    target_ms: f64,
-    /// c_vis: what being in view adds to a node's benefit, 0 or more
-    #[arg(long, value_name = "C", default_value_t = 1.275, help_heading = "Selection")]
-    vis: f64,
-    /// c_fore: how much the angle counts at which a node is seen, 0-1
-    #[arg(long, value_name = "C", default_value_t = 0.45, help_heading = "Selection")]
-    fore: f64,
-    /// c_hystSwitch: how far a counter goes before it counts. More: fewer and later switches
-    #[arg(long, value_name = "C", default_value_t = 1500.0, help_heading = "Selection")]
-    hyst_switch: f64,
-    /// c_hystLimit: how far counters go at most, --hyst-switch or more
-    #[arg(long, value_name = "C", default_value_t = 4510.0, help_heading = "Selection")]
-    hyst_limit: f64,
-    /// Where counters begin: `affordable` lets nodes in at once only where their time suffices
-    #[arg(long, value_enum, default_value_t = StartOfHysteresis::Affordable, help_heading = "Selection")]
-    hyst_start: StartOfHysteresis,
-    /// Seconds by which the camera is moved on before distances are taken
-    #[arg(long, value_name = "S", default_value_t = 0.5, help_heading = "Selection")]
-    lookahead: f64,
-    /// Metres; what is nearer counts as this near [default: 1, less in scenes below 100 m]
-    #[arg(long, value_name = "M", help_heading = "Selection")]
-    least_distance: Option<f64>,
-    /// Draw children only where all of them are in memory, not only those in view
-    #[arg(long, help_heading = "Selection")]
-    all_siblings: bool,
-    /// By what part v_time follows the last frame, 0-1; 0 turns this feedback off
-    #[arg(long, value_name = "PART", default_value_t = 0.1, help_heading = "Selection")]
-    v_time_gain: f64,
-    /// By what part shareTime changes in a frame, 0-1; 0 turns this feedback off
-    #[arg(long, value_name = "PART", default_value_t = 0.01, help_heading = "Selection")]
-    share_gain: f64,
-    /// The part of the target by which frames must miss it before shareTime changes
-    #[arg(long, value_name = "PART", default_value_t = 0.05, help_heading = "Selection")]
-    share_slack: f64,
-    /// How many times the time for nodes shareTime may be, 1 or more. More: finer where little is
-    /// in view, and later back on target when more comes
-    #[arg(long, value_name = "TIMES", default_value_t = 10.0, help_heading = "Selection")]
-    share_limit: f64,
-    /// `plain` as the thesis words it, which swings; `damped` waits for what is on its way
-    #[arg(long, value_enum, default_value_t = ShareFeedback::Damped, help_heading = "Selection")]
-    share_feedback: ShareFeedback,
-
-    /// maxMemory: the most bytes in use, loads under way included; with KiB, MiB or GiB
-    #[arg(long, value_name = "BYTES", default_value = "1GiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
-    max_memory: u64,
-    /// Bytes read before looking again at what matters most
-    #[arg(long, value_name = "BYTES", default_value = "64KiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
-    portion: u64,
-    /// Bytes that become resident in a frame; one node always does
-    #[arg(long, value_name = "BYTES", default_value = "4MiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
-    upload: u64,
-    /// A node makes room only for one whose priority is higher by this part
-    #[arg(long, value_name = "PART", default_value_t = 0.1, help_heading = "Memory and loading")]
-    evict_margin: f64,
-
-    /// Width and height of the picture in pixels
-    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size, help_heading = "Drawing")]
-    size: Size,
-    /// Which graphics adapter: part of its name, or its number
-    #[arg(long, value_name = "NAME", help_heading = "Drawing")]
-    adapter: Option<String>,
-    /// Write every Nth frame as PNG into DIR/snapshots, N 1 or more
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Drawing")]
-    snapshots: Option<u64>,
-    /// Draw every Nth frame from the leaves too, outside of its time, and log how far it is from
-    /// that: FLIP, PSNR, SSIM, gaps, and the pop where levels toggled. N 1 or more
-    #[arg(long, value_name = "N", conflicts_with = "show_levels", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Drawing")]
-    reference_every: Option<u64>,
-    /// Tint nodes by level
-    #[arg(long, help_heading = "Drawing")]
-    show_levels: bool,
-    /// `photo`: pictures as they are; `head-light`: lit from behind the viewer; `unlit`
-    #[arg(long, value_enum, default_value_t = ShadingArg::Photo, help_heading = "Drawing")]
-    shading: ShadingArg,
-    /// Leave away the backs of triangles that are not double-sided
-    #[arg(long, help_heading = "Drawing")]
-    cull: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Clock {
-    Wall,
-    Model,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ShadingArg {
-    Photo,
-    HeadLight,
-    Unlit,
-}
-
-/// A number of bytes, with or without KiB, MiB or GiB.
-fn parse_bytes(text: &str) -> Result<u64, String> {
-    let units = [("KiB", 10), ("MiB", 20), ("GiB", 30), ("K", 10), ("M", 20), ("G", 30), ("B", 0)];
-    let (number, shift) = units
-        .iter()
-        .find_map(|&(unit, shift)| text.strip_suffix(unit).map(|number| (number, shift)))
-        .unwrap_or((text, 0));
-    let wanted = "expected bytes such as 1048576, 512MiB or 1.5GiB";
-    let number: f64 = number.trim().parse().map_err(|_| wanted.to_owned())?;
-    let bytes = number * f64::from(1u32 << shift);
-    if bytes.is_finite() && (0.0..=1e18).contains(&bytes) {
-        Ok(bytes as u64)
-    } else {
-        Err(wanted.to_owned())
-    }
-}
-
-fn parse_size(text: &str) -> Result<Size, String> {
-    let wanted = "expected width and height in pixels, such as 1280x720";
-    let (width, height) = text.split_once('x').ok_or(wanted)?;
-    let side = |text: &str| match text.parse::<u32>() {
-        Ok(side @ 1..=16384) => Ok(side),
-        _ => Err(wanted),
-    };
-    Ok(Size([side(width)?, side(height)?]))
-}
-
-impl RunArgs {
-    fn options(&self, session: &Session) -> BenchOptions {
-        let least = (session.tree().diagonal() / 100.0).clamp(1e-6, 1.0);
-        BenchOptions {
-            selection: LakhiaOptions {
-                target_ms: self.target_ms,
-                vis: self.vis,
-                fore: self.fore,
-                hyst_switch: self.hyst_switch,
-                hyst_limit: self.hyst_limit,
-                hyst_start: self.hyst_start,
-                lookahead_s: self.lookahead,
-                least_distance: self.least_distance.unwrap_or(least),
-                all_siblings: self.all_siblings,
-                v_time_gain: self.v_time_gain,
-                share_gain: self.share_gain,
-                share_slack: self.share_slack,
-                share_limit: self.share_limit,
-                share_feedback: self.share_feedback,
-                ..LakhiaOptions::default()
-            },
-            residency: ResidencyOptions {
-                max_memory_bytes: self.max_memory,
-                portion_bytes: self.portion,
-                upload_bytes: self.upload,
-                evict_margin: self.evict_margin,
-            },
-            pace: self.pace,
-            size: self.size,
-            settle_frames: self.settle_frames,
-        }
-    }
 }
 
 /// Keeps Mesa's device selection from asking for a display, of which there need be none, and from
@@ -302,6 +130,7 @@ fn main() -> ExitCode {
         Some(Command::Calibrate { scene, adapter, size, out }) => {
             calibrate(&scene, adapter, size, &out)
         }
+        Some(Command::Sweep { targets, run }) => sweep(&targets, &run),
         None => replay(&cli.run),
     };
     match done {
@@ -342,6 +171,42 @@ fn make_path(
 }
 
 fn replay(arguments: &RunArgs) -> Result<()> {
+    let (_, unusable) = replay_once(arguments)?;
+    unusable.map_or(Ok(()), Err)
+}
+
+/// Frames between those that a sweep compares with the leaves.
+const SWEEP_EVERY: u64 = 10;
+
+fn sweep(targets: &[f64], arguments: &RunArgs) -> Result<()> {
+    if arguments.target_ms.is_some() {
+        return Err(Error::Usage("--target-ms: a sweep has --targets".into()));
+    }
+    let mut sweep = Sweep::default();
+    let mut first_unusable = None;
+    for &target in targets {
+        let mut run = arguments.clone();
+        run.target_ms = Some(target);
+        run.reference_every.get_or_insert(SWEEP_EVERY);
+        run.out = arguments.out.join(format!("target-{target}"));
+        let (summary, unusable) = replay_once(&run)?;
+        sweep.summaries.push(summary);
+        first_unusable = first_unusable.or(unusable);
+    }
+    let name =
+        |path: &Option<PathBuf>| path.as_deref().unwrap_or(Path::new("")).display().to_string();
+    let title = format!("{} along {}", name(&arguments.scene), name(&arguments.path));
+    let files = sweep.write(&arguments.out, &title)?;
+    if !arguments.quiet {
+        let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        print(&format!("{}\nwritten: {}\n", sweep.text(), files.join(", ")))?;
+    }
+    first_unusable.map_or(Ok(()), Err)
+}
+
+/// One run, written and told of: its summary, and what is to be said of files that it could not
+/// use.
+fn replay_once(arguments: &RunArgs) -> Result<(serde_json::Value, Option<Error>)> {
     let (Some(dir), Some(path)) = (&arguments.scene, &arguments.path) else {
         return Err(Error::Usage("expected OUT and PATH.csv".into()));
     };
@@ -362,19 +227,15 @@ fn replay(arguments: &RunArgs) -> Result<()> {
         let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         print(&format!("{}\nwritten: {}\n", summary_text(&summary), files.join(", ")))?;
     }
-    match context.broken.as_slice() {
-        [] => Ok(()),
-        [first, ..] => Err(Error::input(
-            dir,
-            format!(
-                "the run went on without {} that cannot be used; build again. The first: {first}",
-                match context.broken.len() {
-                    1 => "1 file".to_owned(),
-                    count => format!("{count} files"),
-                }
-            ),
-        )),
-    }
+    let unusable = context.broken.first().map(|first| {
+        let files = match context.broken.len() {
+            1 => "1 file".to_owned(),
+            count => format!("{count} files"),
+        };
+        let what = "that cannot be used; build again. The first:";
+        Error::input(dir, format!("the run went on without {files} {what} {first}"))
+    });
+    Ok((summary, unusable))
 }
 
 #[cfg(feature = "render")]
@@ -388,6 +249,7 @@ fn run(
 ) -> Result<(Run, Context)> {
     use hlod::bench::{Reference, Snapshots, Witness};
     use hlod::render::{RenderOptions, Renderer, Shading};
+    use run_args::ShadingArg;
     let render = RenderOptions {
         size: options.size.0,
         adapter: arguments.adapter.clone(),
@@ -425,6 +287,9 @@ fn run(
         }
     };
     context.reference = reference.map(Reference::context).transpose()?;
+    let found = context.reference.iter().flat_map(|reference| &reference.broken);
+    let more: Vec<String> = found.filter(|what| !context.broken.contains(what)).cloned().collect();
+    context.broken.extend(more);
     Ok((run, context))
 }
 
