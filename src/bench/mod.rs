@@ -31,7 +31,7 @@ pub use options::{BenchOptions, Pace, Size};
 pub use record::FrameRecord;
 #[cfg(feature = "render")]
 pub use reference::{Painter, Reference};
-pub use replay::{Drawn, Replay, Run, World, run};
+pub use replay::{Drawn, Look, Replay, Run, World, run};
 pub use report::report_html;
 pub use session::Session;
 pub use summary::{Context, SUMMARY_VERSION, summary, summary_text};

@@ -45,14 +45,18 @@ pub trait World {
     }
 
     /// Stands still while somebody looks at the frame that was drawn last, with its picture where
-    /// there is one: nothing is loaded meanwhile.
-    fn aside(&mut self, look: &mut dyn FnMut(Option<RgbaImage>) -> Result<()>) -> Result<()> {
+    /// there is one: nothing is loaded meanwhile, and nothing of it is left behind.
+    fn aside(&mut self, front: &[u32], view: &View, look: &mut Look<'_>) -> Result<()> {
+        let _ = (front, view);
         look(None)
     }
 
     /// Bytes of the whole process; 0 where that is not measured.
     fn process_bytes(&mut self) -> u64;
 }
+
+/// Looks at a picture, where there is one.
+pub type Look<'a> = dyn FnMut(Option<RgbaImage>) -> Result<()> + 'a;
 
 /// What drawing a frame took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -212,7 +216,7 @@ impl State {
         };
         let before = (record.toggles() > 0).then_some(&self.before[..]);
         let front = &self.selection.front[..];
-        replay.world.aside(&mut |drawn| {
+        replay.world.aside(front, &view, &mut |drawn| {
             let sighting = Sighting { frame: record.frame, view: &view, front, before, drawn };
             record.accuracy = Some(witness.look(sighting)?);
             Ok(())
