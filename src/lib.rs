@@ -14,6 +14,7 @@ pub mod format;
 pub mod import;
 pub mod loading;
 pub mod mesh;
+pub mod picture_error;
 pub mod render;
 pub mod report;
 pub mod runtime;

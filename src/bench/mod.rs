@@ -1,33 +1,41 @@
 //! Replays camera paths over a built scene and logs what a user would have felt.
 
+mod accuracy;
 mod clock;
 mod compare;
 mod model;
 mod options;
 mod record;
+#[cfg(feature = "render")]
+mod reference;
 mod replay;
 mod report;
 mod session;
 mod statistics;
 mod summary;
+mod sweep;
 #[cfg(test)]
 mod tests;
 #[cfg(feature = "render")]
 mod wall;
 mod write;
 
+pub use accuracy::{Accuracy, ReferenceContext, Sighting, Witness, WorstFrame};
 pub use clock::{CLOCK_FILE_VERSION, ClockConstants};
 pub use compare::{
-    Bytes, Comparison, Count, Dimension, Limit, Limits, Milliseconds, Points, Row, SummaryFile,
-    Unit, compare,
+    Bytes, Comparison, Count, Dimension, Flip, Limit, Limits, Milliseconds, Points, Row,
+    SummaryFile, Unit, compare,
 };
 pub use model::ModelWorld;
 pub use options::{BenchOptions, Pace, Size};
 pub use record::FrameRecord;
-pub use replay::{Drawn, Replay, Run, World, run};
+#[cfg(feature = "render")]
+pub use reference::{Painter, Reference};
+pub use replay::{Drawn, Look, Replay, Run, World, run};
 pub use report::report_html;
 pub use session::Session;
 pub use summary::{Context, SUMMARY_VERSION, summary, summary_text};
+pub use sweep::Sweep;
 #[cfg(feature = "render")]
 pub use wall::{Snapshots, WallWorld, calibrate, measure_start};
 pub use write::{check_output, write_run};

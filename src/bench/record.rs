@@ -1,5 +1,7 @@
 //! What is logged of a frame.
 
+use super::Accuracy;
+
 /// What is logged of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameRecord {
@@ -57,6 +59,8 @@ pub struct FrameRecord {
     pub nodes_by_level: Vec<u32>,
     /// Triangles drawn, by level.
     pub triangles_by_level: Vec<u64>,
+    /// How far the picture is from that of the leaves, where that was looked at.
+    pub accuracy: Option<Accuracy>,
 }
 
 impl FrameRecord {
@@ -96,7 +100,8 @@ impl FrameRecord {
         ];
         let by_level = |what: &str| (0..levels).map(|l| format!("{what}_level_{l}")).collect();
         let by_level: [Vec<String>; 2] = [by_level("nodes"), by_level("triangles")];
-        fixed.into_iter().map(String::from).chain(by_level.concat()).collect()
+        let fixed = fixed.into_iter().chain(Accuracy::COLUMNS).map(String::from);
+        fixed.chain(by_level.concat()).collect()
     }
 
     /// The fields in the order of the header.
@@ -128,6 +133,10 @@ impl FrameRecord {
             self.evictions.to_string(),
             self.process_bytes.to_string(),
         ];
+        match &self.accuracy {
+            Some(accuracy) => fields.extend(accuracy.fields()),
+            None => fields.extend(Accuracy::COLUMNS.map(|_| String::new())),
+        }
         fields.extend(self.nodes_by_level.iter().map(u32::to_string));
         fields.extend(self.triangles_by_level.iter().map(u64::to_string));
         fields

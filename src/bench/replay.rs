@@ -2,7 +2,9 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use super::{BenchOptions, FrameRecord, Pace};
+use image::RgbaImage;
+
+use super::{BenchOptions, FrameRecord, Pace, Sighting, Witness};
 use crate::camera::{CameraPath, View};
 use crate::runtime::residency::{Changes, Residency};
 use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection, ToggleCounter};
@@ -42,9 +44,19 @@ pub trait World {
         Ok(())
     }
 
+    /// Stands still while somebody looks at the frame that was drawn last, with its picture where
+    /// there is one: nothing is loaded meanwhile, and nothing of it is left behind.
+    fn aside(&mut self, front: &[u32], view: &View, look: &mut Look<'_>) -> Result<()> {
+        let _ = (front, view);
+        look(None)
+    }
+
     /// Bytes of the whole process; 0 where that is not measured.
     fn process_bytes(&mut self) -> u64;
 }
+
+/// Looks at a picture, where there is one.
+pub type Look<'a> = dyn FnMut(Option<RgbaImage>) -> Result<()> + 'a;
 
 /// What drawing a frame took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,6 +77,8 @@ pub struct Replay<'a> {
     pub residency: Arc<Mutex<Residency>>,
     /// Where it takes place.
     pub world: &'a mut dyn World,
+    /// Who looks at its frames, or nobody.
+    pub witness: Option<&'a mut dyn Witness>,
     /// What else determines it.
     pub options: BenchOptions,
     /// Number of levels of the scene.
@@ -103,8 +117,9 @@ pub fn run(mut replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> boo
         state.frame(&mut replay, 0)?;
     }
     for index in 0..replay.path.frames.len() {
-        let record = state.frame(&mut replay, index)?;
+        let mut record = state.frame(&mut replay, index)?;
         replay.world.logged(index as u64)?;
+        state.look(&mut replay, index, &mut record)?;
         let go_on = progress(&record);
         state.run.frames.push(record);
         if !go_on {
@@ -119,6 +134,8 @@ pub fn run(mut replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> boo
 struct State {
     residents: Residents,
     selection: Selection,
+    /// The front of the frame before.
+    before: Vec<u32>,
     toggles: ToggleCounter,
     stale: Vec<u32>,
     others: Vec<(u32, f64)>,
@@ -132,6 +149,7 @@ impl State {
         Self {
             residents: Residents::none(replay.tree.len()),
             selection: Selection::default(),
+            before: Vec::new(),
             toggles: ToggleCounter::default(),
             stale: Vec::new(),
             others: Vec::new(),
@@ -143,8 +161,8 @@ impl State {
 
     fn frame(&mut self, replay: &mut Replay<'_>, index: usize) -> Result<FrameRecord> {
         let path_frame = &replay.path.frames[index];
-        let velocity = replay.path.velocity(index);
-        let view = View::new(path_frame.pose, velocity, replay.options.size.0);
+        let view = view(replay, index);
+        self.before.clone_from(&self.selection.front);
         let mut record = FrameRecord {
             frame: path_frame.frame,
             time_s: path_frame.time_s,
@@ -183,6 +201,26 @@ impl State {
         replay.world.end_frame(&replay.residency, record.frame_ms, interval_ms)?;
         self.count(replay, &mut record)?;
         Ok(record)
+    }
+
+    /// Lets the witness look at the frame that is over.
+    fn look(
+        &mut self,
+        replay: &mut Replay<'_>,
+        index: usize,
+        record: &mut FrameRecord,
+    ) -> Result<()> {
+        let view = view(replay, index);
+        let Some(witness) = replay.witness.as_mut().filter(|witness| witness.wants(index)) else {
+            return Ok(());
+        };
+        let before = (record.toggles() > 0).then_some(&self.before[..]);
+        let front = &self.selection.front[..];
+        replay.world.aside(front, &view, &mut |drawn| {
+            let sighting = Sighting { frame: record.frame, view: &view, front, before, drawn };
+            record.accuracy = Some(witness.look(sighting)?);
+            Ok(())
+        })
     }
 
     /// Tells residency what matters now.
@@ -237,6 +275,12 @@ impl State {
         record.process_bytes = replay.world.process_bytes();
         Ok(())
     }
+}
+
+/// The camera of a frame.
+fn view(replay: &Replay<'_>, index: usize) -> View {
+    let pose = replay.path.frames[index].pose;
+    View::new(pose, replay.path.velocity(index), replay.options.size.0)
 }
 
 /// Milliseconds from a frame to the next, as recorded; the last lasts as long as the one before.

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use super::{BenchOptions, ClockConstants, Context, FrameRecord, ModelWorld, Replay, Run, run};
+use super::{
+    BenchOptions, ClockConstants, Context, FrameRecord, ModelWorld, Replay, Run, Witness, run,
+};
 use crate::Result;
 use crate::camera::CameraPath;
 use crate::format::Scene;
@@ -67,16 +69,19 @@ impl Session {
             path_fingerprint: path_fingerprint(path),
             adapter: None,
             broken: Vec::new(),
+            reference: None,
             levels: self.scene.level_count(),
         }
     }
 
-    /// Replays a path by the model clock: nothing is drawn, and every machine gives the same.
+    /// Replays a path by the model clock: nothing is drawn unless a `witness` does so, and every
+    /// machine gives the same.
     pub fn run_model(
         &self,
         path: &CameraPath,
         mut options: BenchOptions,
         constants: ClockConstants,
+        witness: Option<&mut dyn Witness>,
         progress: impl FnMut(&FrameRecord) -> bool,
     ) -> Result<(Run, Context)> {
         options.selection.time = constants.time_model();
@@ -91,6 +96,10 @@ impl Session {
             policy: &mut policy,
             residency: self.residency(&options)?,
             world: &mut world,
+            witness: match witness {
+                Some(witness) => Some(witness), // for as long as this run
+                None => None,
+            },
             options,
             levels: self.scene.level_count(),
         };
@@ -108,6 +117,7 @@ impl Session {
         constants: Option<ClockConstants>,
         renderer: &mut crate::render::Renderer,
         snapshots: Option<super::Snapshots>,
+        witness: Option<&mut dyn Witness>,
         progress: impl FnMut(&FrameRecord) -> bool,
     ) -> Result<(Run, Context)> {
         options.check()?;
@@ -143,6 +153,10 @@ impl Session {
             policy: &mut policy,
             residency,
             world: &mut world,
+            witness: match witness {
+                Some(witness) => Some(witness), // for as long as this run
+                None => None,
+            },
             options,
             levels: self.scene.level_count(),
         };

@@ -5,7 +5,8 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use super::statistics::{deviation, mean, percentile};
-use super::{BenchOptions, FrameRecord, Run};
+use super::{Accuracy, BenchOptions, FrameRecord, ReferenceContext, Run};
+use crate::picture_error::psnr;
 
 /// The version of the format of `summary.json`, raised where a key changes its meaning.
 pub const SUMMARY_VERSION: u32 = 1;
@@ -37,6 +38,8 @@ pub struct Context {
     pub adapter: Option<Value>,
     /// Files that could not be used, each with what was wrong.
     pub broken: Vec<String>,
+    /// How frames were compared with the leaves; `None` where they were not.
+    pub reference: Option<super::ReferenceContext>,
     /// Number of levels of the scene.
     pub levels: usize,
 }
@@ -121,6 +124,7 @@ pub fn summary(run: &Run, context: &Context) -> Value {
             "waiting_mean": mean(of(|frame| f64::from(frame.waiting))),
             "waiting_last": frames.last().map(|frame| frame.waiting),
         },
+        "accuracy": context.reference.as_ref().map(|reference| accuracy(frames, reference)),
         "select_ms": {
             "mean": mean(of(|frame| frame.select_ms)),
             "max": percentile(&of(|frame| frame.select_ms), 100.0),
@@ -129,6 +133,50 @@ pub fn summary(run: &Run, context: &Context) -> Value {
         "nodes_mean": mean(of(|frame| f64::from(frame.nodes))),
         "triangles_mean": mean(of(|frame| frame.triangles as f64)),
         "levels": (0..context.levels).map(levels).collect::<Vec<_>>(),
+    })
+}
+
+/// How far the frames that were looked at are from the leaves.
+fn accuracy(frames: &[FrameRecord], reference: &ReferenceContext) -> Value {
+    let looked: Vec<&Accuracy> = frames.iter().filter_map(|f| f.accuracy.as_ref()).collect();
+    let of = |field: fn(&Accuracy) -> f64| looked.iter().map(|&a| field(a)).collect::<Vec<f64>>();
+    let spread = |values: Vec<f64>| {
+        json!({
+            "mean": mean(values.iter().copied()),
+            "p95": percentile(&values, 95.0),
+            "max": percentile(&values, 100.0),
+        })
+    };
+    let surface: u64 = looked.iter().map(|a| a.reference_pixels).sum();
+    let pixels = |field: fn(&Accuracy) -> u64| {
+        let sum: u64 = looked.iter().map(|&a| field(a)).sum();
+        json!({
+            "sum": sum,
+            "max": looked.iter().map(|&a| field(a)).max(),
+            "per_100000": sum as f64 / surface.max(1) as f64 * 1e5,
+        })
+    };
+    let squared = of(|a| a.squared_error);
+    let similar: Vec<f64> = looked.iter().filter_map(|a| a.ssim).collect();
+    let pops: Vec<f64> = looked.iter().filter_map(|a| a.pop_flip).collect();
+    json!({
+        "every": reference.every,
+        "adapter": reference.adapter,
+        "frames": looked.len(),
+        "flip_mean": spread(of(|a| a.flip_mean)),
+        "flip_p95": spread(of(|a| a.flip_p95)),
+        // Of all pixels together; null where no pixel differs.
+        "psnr_db": {
+            "all": psnr(mean(squared.iter().copied())),
+            "min": psnr(percentile(&squared, 100.0)),
+        },
+        "ssim": { "mean": mean(similar.iter().copied()), "min": percentile(&similar, 0.0) },
+        "reference_pixels": surface,
+        "gap_pixels": pixels(|a| a.gap_pixels),
+        "inner_gap_pixels": pixels(|a| a.inner_gap_pixels),
+        "extra_pixels": pixels(|a| a.extra_pixels),
+        "pop_frames": pops.len(),
+        "pop_flip": (!pops.is_empty()).then(|| spread(pops)),
     })
 }
 
@@ -249,6 +297,43 @@ pub fn summary_text(summary: &Value) -> String {
             number("/loading/waiting_last")
         ),
     );
+    if summary.pointer("/accuracy").is_some_and(Value::is_object) {
+        line(
+            "accuracy",
+            format!(
+                "FLIP {:.4} mean, {:.4} at worst; SSIM {:.4}; PSNR {}; {} frames looked at",
+                number("/accuracy/flip_mean/mean"),
+                number("/accuracy/flip_mean/max"),
+                number("/accuracy/ssim/mean"),
+                match number("/accuracy/psnr_db/all") {
+                    decibels if decibels.is_nan() => "infinite".into(),
+                    decibels => format!("{decibels:.1} dB"),
+                },
+                number("/accuracy/frames"),
+            ),
+        );
+        line(
+            "gaps",
+            format!(
+                "{} pixels of {}, {} of them within the outline; {} pixels too many",
+                number("/accuracy/gap_pixels/sum"),
+                number("/accuracy/reference_pixels"),
+                number("/accuracy/inner_gap_pixels/sum"),
+                number("/accuracy/extra_pixels/sum"),
+            ),
+        );
+        if number("/accuracy/pop_frames") > 0.0 {
+            line(
+                "pops",
+                format!(
+                    "FLIP {:.4} mean, {:.4} at worst in {} frames with toggles",
+                    number("/accuracy/pop_flip/mean"),
+                    number("/accuracy/pop_flip/max"),
+                    number("/accuracy/pop_frames"),
+                ),
+            );
+        }
+    }
     let broken = summary.pointer("/broken_files").and_then(Value::as_array);
     for file in broken.into_iter().flatten() {
         line("unusable", file.as_str().unwrap_or_default().to_owned());

@@ -64,6 +64,15 @@ fn constants() -> ClockConstants {
 }
 
 fn replay(scene: &Scene, path: &CameraPath, options: BenchOptions) -> Run {
+    replay_before(scene, path, options, None)
+}
+
+fn replay_before(
+    scene: &Scene,
+    path: &CameraPath,
+    options: BenchOptions,
+    witness: Option<&mut dyn Witness>,
+) -> Run {
     let tree = SceneTree::new(scene);
     let sizes = Sizes::new(scene, |vertices, _, _| u64::from(vertices) * 20, |_| 0);
     let residency = Residency::new(&tree, sizes, options.residency).unwrap();
@@ -75,6 +84,10 @@ fn replay(scene: &Scene, path: &CameraPath, options: BenchOptions) -> Run {
         policy: &mut policy,
         residency: Arc::new(Mutex::new(residency)),
         world: &mut world,
+        witness: match witness {
+            Some(witness) => Some(witness),
+            None => None,
+        },
         options,
         levels: scene.level_count(),
     };
@@ -93,6 +106,7 @@ fn context(options: BenchOptions) -> Context {
         path_fingerprint: "p".into(),
         adapter: None,
         broken: Vec::new(),
+        reference: None,
         levels: 3,
     }
 }
@@ -226,4 +240,46 @@ fn a_run_is_written_whole_and_compares_with_itself_and_not_with_another_target()
     other.selection.target_ms = 2.0;
     let error = compare(&first, &write("third", other), &limits, false).unwrap_err();
     assert!(error.to_string().contains("parameters.selection.target_ms: 3.0 against 2.0"));
+}
+
+/// Keeps what it was shown of every third frame.
+#[derive(Default)]
+struct Onlooker(Vec<(u64, Vec<u32>, Option<Vec<u32>>)>);
+
+impl Witness for Onlooker {
+    fn wants(&self, index: usize) -> bool {
+        index.is_multiple_of(3)
+    }
+
+    fn look(&mut self, frame: Sighting<'_>) -> crate::Result<Accuracy> {
+        assert_eq!(frame.drawn, None, "the model draws nothing");
+        self.0.push((frame.frame, frame.front.to_vec(), frame.before.map(<[u32]>::to_vec)));
+        Ok(Accuracy { gap_pixels: frame.frame, ..Accuracy::default() })
+    }
+}
+
+#[test]
+fn a_witness_sees_every_front_and_changes_nothing_but_its_own_columns() {
+    let (scene, path) = (street(20), walk(300));
+    let mut witness = Onlooker::default();
+    let mut watched = replay_before(&scene, &path, options(1 << 20), Some(&mut witness));
+    for (index, frame) in watched.frames.iter_mut().enumerate() {
+        let expected = index.is_multiple_of(3).then_some(frame.frame);
+        assert_eq!(frame.accuracy.take().map(|accuracy| accuracy.gap_pixels), expected);
+    }
+    assert_eq!(watched, replay(&scene, &path, options(1 << 20)));
+    assert_eq!(witness.0.len(), 100);
+    // Where levels toggled, and only there, it saw the front of the frame before too.
+    let mut toggled = 0;
+    for (frame, front, before) in &witness.0 {
+        let record = &watched.frames[*frame as usize];
+        assert_eq!(front.len() as u32, record.nodes);
+        assert_eq!(before.is_some(), record.toggles() > 0);
+        if let Some(before) = before {
+            assert_eq!(before.len() as u32, watched.frames[*frame as usize - 1].nodes);
+            assert_ne!(before, front);
+            toggled += 1;
+        }
+    }
+    assert!(toggled > 0, "no toggle was seen");
 }

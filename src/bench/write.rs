@@ -49,7 +49,7 @@ pub fn write_run(
         ("report.html", report_html(run, context, summary)?.into_bytes()),
     ]
     .map(|(name, bytes)| (dir.join(name), bytes));
-    write_together(&files)?;
+    write_all(&files)?;
     Ok(files.map(|(path, _)| path).into())
 }
 
@@ -70,7 +70,7 @@ pub(crate) fn write_beside(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 /// Writes files beside their places, and only once all of them are whole renames them there.
-fn write_together(files: &[(PathBuf, Vec<u8>)]) -> Result<()> {
+pub(super) fn write_all(files: &[(PathBuf, Vec<u8>)]) -> Result<()> {
     let mut staged = Vec::with_capacity(files.len());
     for (path, bytes) in files {
         if path.is_dir() {

@@ -1,6 +1,7 @@
 //! The loading thread (thesis, section 4.3).
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::JoinHandle;
@@ -28,6 +29,26 @@ struct Shared {
     residency: Arc<Mutex<Residency>>,
     wake: Condvar,
     stop: Mutex<bool>,
+    /// Changed only while `residency` is locked, as is the next.
+    still: AtomicBool,
+    /// A step is under way.
+    busy: AtomicBool,
+    /// Told when a step is over.
+    idle: Condvar,
+}
+
+/// While this lives, the loading thread does nothing.
+#[derive(Debug)]
+pub struct Still<'a>(&'a Shared);
+
+impl Drop for Still<'_> {
+    fn drop(&mut self) {
+        // A thread that died needs no one to tell it to go on.
+        if let Ok(_residency) = self.0.residency.lock() {
+            self.0.still.store(false, Ordering::Relaxed);
+        }
+        self.0.wake.notify_one();
+    }
 }
 
 impl LoadingThread {
@@ -43,7 +64,14 @@ impl LoadingThread {
         decode: Decode,
     ) -> Result<Self> {
         let (sender, arrivals) = channel();
-        let shared = Arc::new(Shared { residency, wake: Condvar::new(), stop: Mutex::new(false) });
+        let shared = Arc::new(Shared {
+            residency,
+            wake: Condvar::new(),
+            stop: Mutex::new(false),
+            still: AtomicBool::new(false),
+            busy: AtomicBool::new(false),
+            idle: Condvar::new(),
+        });
         let of_thread = Arc::clone(&shared);
         let handle = std::thread::Builder::new()
             .name("loading".into())
@@ -57,6 +85,21 @@ impl LoadingThread {
     /// Says that there may be something new to do.
     pub fn wake(&self) {
         self.shared.wake.notify_one();
+    }
+
+    /// Has the thread stand still, once it is done with the portion that it is reading or the node
+    /// that it is decoding.
+    pub fn still(&self) -> Result<Still<'_>> {
+        let died = || Error::Internal("the loading thread died".into());
+        let mut residency = self.shared.residency.lock().map_err(|_| died())?;
+        self.shared.still.store(true, Ordering::Relaxed);
+        let still = Still(&self.shared);
+        while self.shared.busy.load(Ordering::Relaxed) && self.check().is_ok() {
+            let waited = self.shared.idle.wait_timeout(residency, LONGEST_SLEEP);
+            residency = waited.map_err(|_| died())?.0;
+        }
+        drop(residency);
+        Ok(still)
     }
 
     /// What arrived since the last call; errors name files that cannot be used. A node comes here
@@ -102,7 +145,12 @@ impl Loader {
         super::background::give_way();
         let mut readings = BTreeMap::new();
         while let Some((step, reading)) = self.next(&mut readings) {
-            if !self.carry_out(step, reading, &mut readings) {
+            let go_on = self.carry_out(step, reading, &mut readings);
+            let Some(residency) = self.lock() else { return };
+            self.shared.busy.store(false, Ordering::Relaxed);
+            drop(residency);
+            self.shared.idle.notify_one();
+            if !go_on {
                 return;
             }
         }
@@ -123,7 +171,8 @@ impl Loader {
             if self.stopped() {
                 return None;
             }
-            let step = residency.next_step();
+            let still = self.shared.still.load(Ordering::Relaxed);
+            let step = if still { None } else { residency.next_step() };
             // Loads that were given up.
             readings.retain(|&node, _| matches!(residency.state(node), NodeState::Loading { .. }));
             if let Some(step) = step {
@@ -132,6 +181,7 @@ impl Loader {
                 let reading = reading.unwrap_or_else(|| {
                     self.files.begin(step.node, |texture| residency.has_texture(texture))
                 });
+                self.shared.busy.store(true, Ordering::Relaxed);
                 return Some((step, reading));
             }
             residency = self.shared.wake.wait_timeout(residency, LONGEST_SLEEP).ok()?.0;

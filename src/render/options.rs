@@ -32,6 +32,9 @@ pub struct RenderOptions {
     pub cull: bool,
     /// Colour where nothing is drawn, sRGB.
     pub background: [u8; 3],
+    /// Keep depths after drawing, for [`draw_over`](super::Renderer::draw_over) and
+    /// [`depths`](super::Renderer::depths); no.
+    pub keep_depths: bool,
 }
 
 impl Default for RenderOptions {
@@ -43,6 +46,7 @@ impl Default for RenderOptions {
             show_levels: false,
             cull: false,
             background: [178, 198, 216],
+            keep_depths: false,
         }
     }
 }

@@ -19,7 +19,7 @@ use super::instance::{Instance, level_tint};
 use super::options::RenderOptions;
 use super::pipelines::Pipelines;
 use super::samplers::Samplers;
-use super::target::Target;
+use super::target::{Layer, Target};
 use super::warm_up::WarmUp;
 use crate::camera::Pose;
 use crate::{Error, Result};
@@ -84,7 +84,8 @@ impl Renderer {
                 device.label
             )));
         }
-        let target = Target::new(&device.device, options.size, options.background);
+        let target =
+            Target::new(&device.device, options.size, options.background, options.keep_depths);
         let pipelines = Pipelines::new(&device.device, options.shading);
         let camera = device.device.create_buffer(&BufferDescriptor {
             label: Some("camera"),
@@ -205,11 +206,30 @@ impl Renderer {
     /// the shared pictures that they use. Nothing nearer than `near` metres (above 0) is seen; how
     /// small that is costs no precision.
     pub fn draw(&mut self, front: &[u32], pose: &Pose, near: f32) -> Result<DrawTimes> {
+        self.draw_on(false, front, pose, near)
+    }
+
+    /// The same without beginning anew: what was drawn last, from the same pose, stays where it is
+    /// nearer. Scenes larger than what is held can be drawn so part by part. Depths must be
+    /// [kept](RenderOptions::keep_depths).
+    pub fn draw_over(&mut self, nodes: &[u32], pose: &Pose, near: f32) -> Result<DrawTimes> {
+        self.check_depths()?;
+        self.draw_on(true, nodes, pose, near)
+    }
+
+    fn check_depths(&self) -> Result<()> {
+        match self.options.keep_depths {
+            true => Ok(()),
+            false => Err(Error::Internal("depths are wanted and were not kept".into())),
+        }
+    }
+
+    fn draw_on(&mut self, over: bool, front: &[u32], pose: &Pose, near: f32) -> Result<DrawTimes> {
         let begin = Instant::now();
         self.order(front, pose.position)?;
         let triangles = self.write(pose, near)?;
         let mut encoder = self.device.device.create_command_encoder(&Default::default());
-        self.encode(&mut encoder)?;
+        self.encode(&mut encoder, over)?;
         let submission = self.device.queue.submit([encoder.finish()]);
         let encoded = Instant::now();
         self.device.wait(submission)?;
@@ -277,8 +297,8 @@ impl Renderer {
         Ok(triangles)
     }
 
-    fn encode(&self, encoder: &mut wgpu::CommandEncoder) -> Result<()> {
-        let mut pass = self.target.begin(encoder);
+    fn encode(&self, encoder: &mut wgpu::CommandEncoder, over: bool) -> Result<()> {
+        let mut pass = self.target.begin(encoder, over);
         pass.set_bind_group(0, &self.camera_binding, &[]);
         pass.set_vertex_buffer(1, self.instances.slice(..));
         let (mut pipeline, mut node, mut binding) = (None, None, None);
@@ -315,30 +335,47 @@ impl Renderer {
 
     /// The frame that was drawn last.
     pub fn snapshot(&self) -> Result<RgbaImage> {
-        let mut image = self.read_back()?;
+        let mut image = self.surface()?;
         image.pixels_mut().for_each(|pixel| pixel.0[3] = 255);
         Ok(image)
     }
 
     /// Where a triangle was drawn in the last frame (255), and where none was (0).
     pub fn coverage(&self) -> Result<image::GrayImage> {
-        let image = self.read_back()?;
+        let image = self.surface()?;
         Ok(image::GrayImage::from_fn(image.width(), image.height(), |x, y| {
             image::Luma([image.get_pixel(x, y).0[3]])
         }))
     }
 
-    /// The last frame; alpha is where a triangle was drawn.
-    fn read_back(&self) -> Result<RgbaImage> {
-        let mut encoder = self.device.device.create_command_encoder(&Default::default());
-        let buffer = self.target.copy_out(&self.device.device, &mut encoder);
-        self.device.wait(self.device.queue.submit([encoder.finish()]))?;
+    /// Both at once: the frame that was drawn last, with alpha 255 where a triangle was drawn and
+    /// 0 where none was.
+    pub fn surface(&self) -> Result<RgbaImage> {
         let [width, height] = self.options.size;
-        self.target
-            .pixels(&buffer)
-            .and_then(|pixels| RgbaImage::from_raw(width, height, pixels))
-            .ok_or_else(|| Error::Graphics("the picture could not be read back".into()))
+        RgbaImage::from_raw(width, height, self.read_back(Layer::Color)?).ok_or_else(lost)
     }
+
+    /// Metres along the view to what is seen at each pixel of the last frame, row by row; infinite
+    /// where nothing is. `near` is that of the frame. Depths must be
+    /// [kept](RenderOptions::keep_depths).
+    pub fn depths(&self, near: f32) -> Result<Vec<f32>> {
+        self.check_depths()?;
+        let bytes = self.read_back(Layer::Depth)?;
+        let depths = bytes.as_chunks::<4>().0.iter().map(|&bytes| f32::from_le_bytes(bytes));
+        Ok(depths.map(|depth| near / depth).collect())
+    }
+
+    /// The last frame, four bytes a pixel.
+    fn read_back(&self, layer: Layer) -> Result<Vec<u8>> {
+        let mut encoder = self.device.device.create_command_encoder(&Default::default());
+        let buffer = self.target.copy_out(&self.device.device, &mut encoder, layer);
+        self.device.wait(self.device.queue.submit([encoder.finish()]))?;
+        self.target.pixels(&buffer).ok_or_else(lost)
+    }
+}
+
+fn lost() -> Error {
+    Error::Graphics("the picture could not be read back".into())
 }
 
 fn instance_buffer(device: &Device, room: usize) -> Buffer {

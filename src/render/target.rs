@@ -18,12 +18,21 @@ pub(super) struct Target {
     size: [u32; 2],
     color: Texture,
     color_view: TextureView,
+    depth: Texture,
     depth_view: TextureView,
+    keep_depths: bool,
     background: wgpu::Color,
 }
 
+/// Which of the two pictures of a target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Layer {
+    Color,
+    Depth,
+}
+
 impl Target {
-    pub fn new(device: &Device, size: [u32; 2], background: [u8; 3]) -> Self {
+    pub fn new(device: &Device, size: [u32; 2], background: [u8; 3], keep_depths: bool) -> Self {
         let texture = |label, format, usage| {
             device.create_texture(&TextureDescriptor {
                 label: Some(label),
@@ -37,7 +46,8 @@ impl Target {
             })
         };
         let color = texture("color", COLOR_FORMAT, TextureUsages::COPY_SRC);
-        let depth = texture("depth", DEPTH_FORMAT, TextureUsages::empty());
+        let usage = if keep_depths { TextureUsages::COPY_SRC } else { TextureUsages::empty() };
+        let depth = texture("depth", DEPTH_FORMAT, usage);
         let [r, g, b] = background
             .map(|byte| f64::from(crate::texture::srgb::to_linear()[usize::from(byte)]) / 65535.0);
         Self {
@@ -45,13 +55,15 @@ impl Target {
             color_view: color.create_view(&Default::default()),
             depth_view: depth.create_view(&Default::default()),
             color,
+            depth,
+            keep_depths,
             background: wgpu::Color { r, g, b, a: 0.0 },
         }
     }
 
     /// A few pixels to try things on.
     pub fn tiny(device: &Device) -> Self {
-        Self::new(device, [8, 8], [0; 3])
+        Self::new(device, [8, 8], [0; 3], false)
     }
 
     /// Bytes of the colour and the depth of all pixels.
@@ -59,27 +71,30 @@ impl Target {
         u64::from(self.size[0]) * u64::from(self.size[1]) * 8
     }
 
-    /// Begins to draw on an empty picture.
-    pub fn begin<'a>(&self, encoder: &'a mut CommandEncoder) -> RenderPass<'a> {
+    /// Begins to draw on an empty picture, or over what was drawn before, whose depths were kept.
+    pub fn begin<'a>(&self, encoder: &'a mut CommandEncoder, over: bool) -> RenderPass<'a> {
+        let color = if over { LoadOp::Load } else { LoadOp::Clear(self.background) };
+        let depth = if over { LoadOp::Load } else { LoadOp::Clear(0.0) };
+        let store = if self.keep_depths { StoreOp::Store } else { StoreOp::Discard };
         encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("frame"),
             color_attachments: &[Some(RenderPassColorAttachment {
                 view: &self.color_view,
                 depth_slice: None,
                 resolve_target: None,
-                ops: Operations { load: LoadOp::Clear(self.background), store: StoreOp::Store },
+                ops: Operations { load: color, store: StoreOp::Store },
             })],
             depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
                 view: &self.depth_view,
-                depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Discard }),
+                depth_ops: Some(Operations { load: depth, store }),
                 stencil_ops: None,
             }),
             ..Default::default()
         })
     }
 
-    /// Copies the colours to a buffer that can be read.
-    pub fn copy_out(&self, device: &Device, encoder: &mut CommandEncoder) -> Buffer {
+    /// Copies colours or depths to a buffer that can be read: four bytes a pixel either way.
+    pub fn copy_out(&self, device: &Device, encoder: &mut CommandEncoder, layer: Layer) -> Buffer {
         let buffer = device.create_buffer(&BufferDescriptor {
             label: Some("read back"),
             size: u64::from(self.row_bytes()) * u64::from(self.size[1]),
@@ -88,7 +103,10 @@ impl Target {
         });
         encoder.copy_texture_to_buffer(
             TexelCopyTextureInfo {
-                texture: &self.color,
+                texture: match layer {
+                    Layer::Color => &self.color,
+                    Layer::Depth => &self.depth,
+                },
                 mip_level: 0,
                 origin: Origin3d::ZERO,
                 aspect: TextureAspect::All,
@@ -107,7 +125,8 @@ impl Target {
         buffer
     }
 
-    /// The pixels of a buffer that was copied and has arrived, RGBA; `None` where it was lost.
+    /// The pixels of a buffer that was copied and has arrived, four bytes each; `None` where it
+    /// was lost.
     pub fn pixels(&self, buffer: &Buffer) -> Option<Vec<u8>> {
         let mapped = buffer.get_mapped_range(..).ok()?;
         let row = self.size[0] as usize * 4;

@@ -43,7 +43,7 @@ impl WarmUp {
         shared: impl Fn(u32) -> Option<&'a GpuPicture>,
     ) -> Result<()> {
         let mut encoder = device.device.create_command_encoder(&Default::default());
-        let mut pass = self.target.begin(&mut encoder);
+        let mut pass = self.target.begin(&mut encoder, false);
         let mut some = false;
         for draw in &node.draws {
             let picture = match draw.picture {

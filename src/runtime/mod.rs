@@ -4,6 +4,7 @@
 //! Time enters as an argument, so that a run can be replayed exactly.
 
 mod covered;
+mod front_before;
 pub mod lakhia;
 mod policy;
 pub mod residency;
@@ -13,6 +14,7 @@ mod toggles;
 mod tree;
 
 pub use covered::{Covered, covered};
+pub use front_before::front_before;
 pub use policy::{FrameOutcome, Policy, Residents, Selection};
 pub use toggles::{ToggleCounter, Toggles};
 pub use tree::{SceneTree, TreeNode};

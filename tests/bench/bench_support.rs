@@ -118,7 +118,10 @@ impl Frames {
         let mut reader = csv::Reader::from_reader(bytes);
         let header = reader.headers().unwrap().iter().map(String::from).collect();
         let row = |row: csv::Result<csv::StringRecord>| {
-            row.unwrap().iter().map(|field| field.parse().unwrap()).collect()
+            // What was not looked at has no figure.
+            let number =
+                |field: &str| if field.is_empty() { f64::NAN } else { field.parse().unwrap() };
+            row.unwrap().iter().map(number).collect()
         };
         Self { header, rows: reader.records().map(row).collect() }
     }

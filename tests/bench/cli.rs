@@ -105,6 +105,8 @@ fn bad_usage_is_refused_with_the_range() {
         (&["--size", "0x10"], &["--size", "1280x720"]),
         (&["--size", "99999x10"], &["--size"]),
         (&["--snapshots", "0"], &["--snapshots"]),
+        (&["--reference-every", "0"], &["--reference-every"]),
+        (&["--reference-every", "5", "--show-levels"], &["--reference-every", "--show-levels"]),
     ];
     for (options, parts) in cases {
         run_refused(&place, options, USAGE, parts);

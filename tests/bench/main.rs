@@ -13,8 +13,12 @@ mod bench_support;
 mod cli;
 mod damage;
 mod golden;
+#[cfg(feature = "render")]
+mod mixtures;
 mod model_clock;
 mod output;
+#[cfg(feature = "render")]
+mod reference;
 mod stress;
 mod tall_street;
 #[cfg(feature = "render")]

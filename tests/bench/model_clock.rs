@@ -75,6 +75,7 @@ fn replay(scene: &Scene, frames: usize, target_ms: f64) -> Vec<FrameRecord> {
         policy: &mut policy,
         residency: Arc::new(Mutex::new(residency)),
         world: &mut world,
+        witness: None,
         options,
         levels: scene.level_count(),
     };

@@ -26,6 +26,9 @@ pub struct Milliseconds;
 /// Bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bytes;
+/// Differences of pictures, 0 to 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flip;
 /// Percentage points, for figures that are percentages themselves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Points;
@@ -52,6 +55,11 @@ impl Dimension for Bytes {
         ("B", 1.0),
     ];
     const EXAMPLE: &'static str = "10MiB";
+}
+
+impl Dimension for Flip {
+    const UNITS: &'static [(&'static str, f64)] = &[("", 1.0)];
+    const EXAMPLE: &'static str = "0.002";
 }
 
 impl Dimension for Points {

@@ -15,6 +15,8 @@ pub enum Unit {
     Bytes,
     /// Percent.
     Percent,
+    /// A difference of pictures, 0 to 1.
+    Flip,
 }
 
 /// One figure of a summary.
@@ -25,6 +27,8 @@ pub(super) struct Metric {
     pub keys: &'static [&'static str],
     /// What stands there in units of ours.
     pub scale: f64,
+    /// Runs that were not compared with the leaves have none.
+    pub optional: bool,
     /// Only how large it is matters, not in which direction.
     pub magnitude: bool,
     /// Its limit: how it reads and whether it is exceeded.
@@ -50,6 +54,7 @@ macro_rules! metric {
             unit: Unit::$unit,
             keys: &[$($key),+],
             scale: 1.0,
+            optional: false,
             magnitude: false,
             judge: |limits, base, new| verdict(&limits.$limit, base, new),
         }
@@ -60,6 +65,7 @@ macro_rules! metric {
             unit: Unit::$unit,
             keys: &[$($key),+],
             scale: 1.0,
+            optional: false,
             magnitude: false,
             judge: |_, _, _| None,
         }
@@ -100,4 +106,18 @@ pub(super) const METRICS: &[Metric] = &[
     metric!("nodes visited", Count, ["/visited_mean"], max_visited_increase),
     metric!("nodes drawn", Count, ["/nodes_mean"]),
     metric!("triangles drawn", Count, ["/triangles_mean"]),
+    Metric {
+        optional: true,
+        ..metric!("FLIP", Flip, ["/accuracy/flip_mean/mean"], max_flip_increase)
+    },
+    Metric { optional: true, ..metric!("FLIP p95", Flip, ["/accuracy/flip_p95/mean"]) },
+    Metric { optional: true, ..metric!("FLIP of toggles", Flip, ["/accuracy/pop_flip/mean"]) },
+    Metric {
+        optional: true,
+        ..metric!("gap pixels", Count, ["/accuracy/gap_pixels/sum"], max_gap_increase)
+    },
+    Metric {
+        optional: true,
+        ..metric!("inner gap pixels", Count, ["/accuracy/inner_gap_pixels/sum"])
+    },
 ];

@@ -12,7 +12,7 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use crate::{Error, Result};
-pub use limit::{Bytes, Count, Dimension, Limit, Milliseconds, Points};
+pub use limit::{Bytes, Count, Dimension, Flip, Limit, Milliseconds, Points};
 use metrics::METRICS;
 pub use metrics::Unit;
 pub use options::Limits;
@@ -64,8 +64,11 @@ pub fn compare(
     }
     let rows = METRICS.iter().map(|metric| {
         let figure = |file: &SummaryFile| -> Result<f64> {
-            let values: Vec<f64> =
-                metric.keys.iter().map(|key| file.number(key)).collect::<Result<_>>()?;
+            let values: Vec<f64> = metric
+                .keys
+                .iter()
+                .map(|key| file.figure(key, metric.optional))
+                .collect::<Result<_>>()?;
             let value = values.iter().sum::<f64>() * metric.scale;
             Ok(if metric.magnitude { value.abs() } else { value })
         };
@@ -80,7 +83,11 @@ pub fn compare(
             limit: verdict.map(|verdict| verdict.limit),
         })
     });
-    Ok(Comparison { differences, rows: rows.collect::<Result<_>>()? })
+    let rows: Vec<Row> = rows.collect::<Result<_>>()?;
+    // What neither run need have is of interest only where it was to be judged.
+    let missing = |row: &Row| row.limit.is_none() && row.base.is_nan() && row.new.is_nan();
+    let rows = METRICS.iter().zip(rows).filter(|(metric, row)| !(metric.optional && missing(row)));
+    Ok(Comparison { differences, rows: rows.map(|(_, row)| row).collect() })
 }
 
 impl Row {
@@ -108,6 +115,7 @@ impl Row {
             Unit::Ms => (value, 3, " ms"),
             Unit::Bytes => (value / f64::from(1 << 20), 2, " MiB"),
             Unit::Percent => (value, 2, " %"),
+            Unit::Flip => (value, 5, ""),
         };
         if signed { format!("{value:+.digits$}{unit}") } else { format!("{value:.digits$}{unit}") }
     }

@@ -1,6 +1,6 @@
 //! What a person may set about a comparison.
 
-use super::limit::{Bytes, Count, Limit, Milliseconds, Points};
+use super::limit::{Bytes, Count, Flip, Limit, Milliseconds, Points};
 
 /// How much figures may rise. Each is a limit in the figure's own unit or a percentage of what it
 /// was in the base; what is not given is shown and not judged. What is met exactly holds.
@@ -49,4 +49,10 @@ pub struct Limits {
     /// Nodes that selection visits in a frame, on average (a number: 3)
     #[arg(long, value_name = "N|%")]
     pub max_visited_increase: Option<Limit<Count>>,
+    /// Mean difference from the leaves, of runs with --reference-every (FLIP, 0-1: 0.002)
+    #[arg(long, value_name = "FLIP|%")]
+    pub max_flip_increase: Option<Limit<Flip>>,
+    /// Background where the leaves have surface, of the same runs (pixels: 3)
+    #[arg(long, value_name = "N|%")]
+    pub max_gap_increase: Option<Limit<Count>>,
 }

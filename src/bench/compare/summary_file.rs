@@ -51,6 +51,14 @@ impl SummaryFile {
         }
     }
 
+    /// The same, NaN too where there is none and there need not be.
+    pub(super) fn figure(&self, key: &str, optional: bool) -> Result<f64> {
+        if optional && self.value.pointer(key).is_none() {
+            return Ok(f64::NAN);
+        }
+        self.number(key)
+    }
+
     fn wrong(&self, key: &str, what: &str) -> Error {
         let key = key.trim_start_matches('/').replace('/', ".");
         Error::input(
@@ -86,6 +94,14 @@ pub(super) fn differences(base: &SummaryFile, new: &SummaryFile) -> Result<Vec<S
     ];
     for (key, _) in keys.into_iter().filter(|(_, matters)| *matters) {
         collect(key.trim_start_matches('/'), base.get(key)?, new.get(key)?, &mut found);
+    }
+    // Figures of pictures say something about each other where both runs have some.
+    let pictures = [base, new].map(|file| file.value.pointer("/accuracy").unwrap_or(&Value::Null));
+    if pictures.iter().all(|accuracy| accuracy.is_object()) {
+        for key in ["every", "adapter"] {
+            let [old, now] = pictures.map(|accuracy| &accuracy[key]);
+            collect(&format!("accuracy.{key}"), old, now, &mut found);
+        }
     }
     if found.len() > MOST_DIFFERENCES {
         let more = found.len() - MOST_DIFFERENCES;

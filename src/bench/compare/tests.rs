@@ -306,3 +306,45 @@ fn a_limit_that_is_none_is_a_mistake_in_the_arguments() {
         assert!(error.contains("expected how much it may rise"), "{error}");
     }
 }
+
+/// A run that was compared with the leaves.
+fn with_pictures(every: u64, flip: f64, gaps: u64) -> SummaryFile {
+    let mut file = file("new.json", summary());
+    file.value["accuracy"] = json!({
+        "every": every,
+        "adapter": { "name": "llvmpipe" },
+        "flip_mean": { "mean": flip },
+        "flip_p95": { "mean": 0.1 },
+        "gap_pixels": { "sum": gaps },
+        "inner_gap_pixels": { "sum": 0 },
+        "pop_flip": null,
+    });
+    file
+}
+
+#[test]
+fn accuracy_is_judged_where_there_is_any_and_missed_where_it_is_asked_for() {
+    let check = |base: &SummaryFile, new: &SummaryFile, arguments: &[&str]| {
+        let comparison = compare(base, new, &limits(arguments), false).unwrap();
+        let rows = comparison.rows.into_iter().filter(|row| row.exceeded);
+        rows.map(|row| row.metric).collect::<Vec<_>>()
+    };
+    let (base, same) = (with_pictures(10, 0.02, 5), with_pictures(10, 0.02, 5));
+    let worse = with_pictures(10, 0.0211, 6);
+    let all = ["--max-flip-increase=5%", "--max-gap-increase=0"];
+    assert!(check(&base, &same, &all).is_empty());
+    assert_eq!(check(&base, &worse, &all), ["FLIP", "gap pixels"]);
+    assert!(check(&base, &worse, &["--max-flip-increase=0.0011"]).is_empty());
+    assert_eq!(check(&base, &worse, &["--max-flip-increase=0.001"]), ["FLIP"]);
+    // A run without, against one with, and two without.
+    let without = file("base.json", summary());
+    assert_eq!(check(&without, &same, &all), ["FLIP", "gap pixels"]);
+    assert_eq!(check(&without, &without, &["--max-flip-increase=1"]), ["FLIP"]);
+    let plain = compare(&without, &without, &Limits::default(), false).unwrap();
+    assert!(plain.rows.iter().all(|row| row.unit != Unit::Flip));
+    let text = compare(&base, &worse, &Limits::default(), false).unwrap().text();
+    assert!(text.contains("0.02110") && !text.contains("FLIP of toggles"), "{text}");
+    let other = with_pictures(20, 0.02, 5);
+    let refused = compare(&base, &other, &Limits::default(), false).unwrap_err().to_string();
+    assert!(refused.contains("accuracy.every: 10 against 20"), "{refused}");
+}

@@ -2,7 +2,7 @@
 
 use super::plot::{Axis, Layer, Plot, Shape};
 use super::series::Places;
-use super::{detail, estimate, frame_time, memory, toggles};
+use super::{accuracy, detail, estimate, frame_time, memory, toggles};
 use crate::Result;
 use crate::bench::{Context, Run};
 
@@ -26,13 +26,18 @@ pub(super) struct Section {
 pub(super) fn sections(run: &Run, context: &Context) -> Vec<Section> {
     let frames = &run.frames;
     let section = |title, figures| Section { title, figures };
-    vec![
+    let mut sections = vec![
         section("Memory and loading", memory::figures(run, context)),
         section("Level of detail", detail::figures(frames, context.levels)),
         section("Accuracy of estimated time", estimate::figures(frames)),
         section("Frame time", frame_time::figures(frames, context)),
         section("Toggles", toggles::figures(frames)),
-    ]
+    ];
+    let accuracy = accuracy::figures(frames);
+    if !accuracy.is_empty() {
+        sections.push(section("Accuracy", accuracy));
+    }
+    sections
 }
 
 impl Figure {

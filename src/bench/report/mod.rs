@@ -1,5 +1,6 @@
 //! A run as a page that a person can read: `report.html`, which needs nothing beside itself.
 
+mod accuracy;
 mod decimate;
 mod detail;
 mod estimate;
@@ -8,6 +9,7 @@ mod frame_time;
 mod memory;
 mod plot;
 mod series;
+mod sweep;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -20,6 +22,7 @@ use serde_json::Value;
 use super::{Context, Run};
 use crate::Result;
 use figures::{Figure, Section, sections};
+pub use sweep::sweep_html;
 
 const STYLE: &str = include_str!("style.css");
 
@@ -52,6 +55,7 @@ pub fn report_html(run: &Run, context: &Context, summary: &Value) -> Result<Stri
                 }
                 (summary_tables(summary))
                 @for section in &sections { (section) }
+                @if let Some(reference) = &context.reference { (accuracy::worst(reference)) }
                 h2 { "Options" }
                 (options(context, summary))
             }

@@ -40,7 +40,7 @@ pub(super) fn groups(summary: &Value) -> Vec<Group> {
     let modelled = summary.pointer("/clock").and_then(Value::as_str) == Some("model");
     let choosing = |key: &str| if modelled { "not measured".into() } else { fine(key) };
 
-    vec![
+    let mut groups = vec![
         Group {
             title: "Memory (6.1)",
             rows: vec![
@@ -108,5 +108,24 @@ pub(super) fn groups(summary: &Value) -> Vec<Group> {
                 Row("most frames in a row without", whole("/toggles/longest_pause"), ""),
             ],
         },
-    ]
+    ];
+    if summary.pointer("/accuracy").is_some_and(Value::is_object) {
+        groups.push(Group {
+            title: "Accuracy",
+            rows: vec![
+                Row("frames looked at", whole("/accuracy/frames"), ""),
+                Row("FLIP, mean", rate("/accuracy/flip_mean/mean"), ""),
+                Row("FLIP of the worst frame", rate("/accuracy/flip_mean/max"), ""),
+                Row("FLIP of 95 in a hundred pixels, mean", rate("/accuracy/flip_p95/mean"), ""),
+                Row("SSIM, mean", rate("/accuracy/ssim/mean"), ""),
+                Row("PSNR over all, dB", one("/accuracy/psnr_db/all"), ""),
+                Row("gap pixels", whole("/accuracy/gap_pixels/sum"), ""),
+                Row("in 100,000 pixels", one("/accuracy/gap_pixels/per_100000"), ""),
+                Row("of them within the outline", whole("/accuracy/inner_gap_pixels/sum"), ""),
+                Row("surface too much, pixels", whole("/accuracy/extra_pixels/sum"), ""),
+                Row("FLIP of frames with toggles, mean", rate("/accuracy/pop_flip/mean"), ""),
+            ],
+        });
+    }
+    groups
 }

@@ -3,7 +3,9 @@ use std::collections::HashSet;
 use serde_json::json;
 
 use super::*;
-use crate::bench::{BenchOptions, ClockConstants, FrameRecord, summary};
+use crate::bench::{
+    Accuracy, BenchOptions, ClockConstants, FrameRecord, ReferenceContext, WorstFrame, summary,
+};
 
 /// A run of made-up frames that has a little of everything.
 fn frames(count: usize, levels: usize) -> Run {
@@ -58,6 +60,7 @@ fn context(levels: usize) -> Context {
         path_fingerprint: "9a74".into(),
         adapter: None,
         broken: Vec::new(),
+        reference: None,
         levels,
     }
 }
@@ -72,11 +75,11 @@ fn count(page: &str, words: &str) -> usize {
 
 /// What holds of every page.
 fn check(page: &str) {
-    for words in
-        ["NaN", "inf ", "Infinity", "http:", "https:", "<script", "url(", "@import", "src="]
-    {
+    for words in ["NaN", "inf ", "Infinity", "http:", "https:", "<script", "url(", "@import"] {
         assert_eq!(count(page, words), 0, "{words}");
     }
+    // Pictures are within the page.
+    assert_eq!(count(page, "src="), count(page, "src=\"data:image/jpeg;base64,"));
     assert_eq!(count(page, "<svg"), count(page, "</svg>"));
     assert_eq!(count(page, "<figure>"), count(page, "<svg"));
     assert_eq!(count(page, "<figcaption>"), count(page, "<figure>"));
@@ -127,6 +130,42 @@ fn a_page_has_each_figure_with_axes_legend_and_a_sentence() {
 fn the_same_run_gives_the_same_page() {
     let run = frames(3000, 5);
     assert!(page(&run, &context(5)) == page(&run.clone(), &context(5)));
+}
+
+#[test]
+fn frames_that_were_compared_with_the_leaves_have_figures_and_the_worst_pictures() {
+    let mut run = frames(60, 2);
+    for (index, frame) in run.frames.iter_mut().enumerate().step_by(10) {
+        frame.accuracy = Some(Accuracy {
+            flip_mean: 0.01 * index as f64,
+            flip_p95: 0.1,
+            squared_error: 3.0,
+            ssim: Some(0.97),
+            reference_pixels: 50_000,
+            gap_pixels: 7,
+            inner_gap_pixels: 1,
+            extra_pixels: 9,
+            pop_flip: (index == 30).then_some(0.02),
+        });
+    }
+    let [drawn, reference, difference] = [[1u8; 9], [2; 9], [3; 9]].map(Vec::from);
+    let accuracy = run.frames[50].accuracy.clone().unwrap();
+    let worst = WorstFrame { frame: 50, accuracy, drawn, reference, difference };
+    let looked = ReferenceContext { every: 10, worst: vec![worst], ..Default::default() };
+    let context = Context { reference: Some(looked), ..context(2) };
+    let page = page(&run, &context);
+    check(&page);
+    assert_eq!((count(&page, "<figure>"), count(&page, "<img")), (19, 3));
+    for words in [
+        "<td>gap pixels</td><td>42</td>",
+        "<td>in 100,000 pixels</td><td>14.0</td>",
+        "<td>FLIP, mean</td><td>0.2500</td>",
+        "<td>FLIP of frames with toggles, mean</td><td>0.0200</td>",
+        "Frame 50",
+        "base64,AQEBAQEBAQEB",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
 }
 
 #[test]

@@ -10,3 +10,4 @@ mod world;
 pub use calibrate::{calibrate, measure_start};
 pub use snapshots::Snapshots;
 pub use world::WallWorld;
+pub(in crate::bench) use world::near_plane;

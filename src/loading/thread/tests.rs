@@ -37,11 +37,9 @@ fn faulty_guarded(files: &NodeFiles, reading: Reading) -> Result<Arrival> {
     guarded(reading.path().to_owned(), || faulty(files, reading))
 }
 
-/// A root with three children, loaded until `done` says so; the states, and the errors.
-fn load(
-    decode: Decode,
-    done: impl Fn(&LoadingThread, &Residency) -> bool,
-) -> (Vec<NodeState>, Vec<String>, Result<()>) {
+/// A root, resident, with three children that are not, and a thread that loads them; their files
+/// are there as long as the folder.
+fn rig(decode: Decode) -> (tempfile::TempDir, Arc<Mutex<Residency>>, LoadingThread) {
     let leaf = || sketch([0.0; 3], 1.0, vec![]);
     let scene = Arc::new(scene(vec![sketch([0.0; 3], 1.0, vec![leaf(), leaf(), leaf()])]));
     let folder = tempfile::tempdir().unwrap();
@@ -59,6 +57,15 @@ fn load(
     let residency = Arc::new(Mutex::new(residency));
     let files = NodeFiles::new(folder.path(), Arc::clone(&scene));
     let thread = LoadingThread::start_with(files, Arc::clone(&residency), decode).unwrap();
+    (folder, residency, thread)
+}
+
+/// Loads until `done` says so; the states, and the errors.
+fn load(
+    decode: Decode,
+    done: impl Fn(&LoadingThread, &Residency) -> bool,
+) -> (Vec<NodeState>, Vec<String>, Result<()>) {
+    let (_folder, residency, thread) = rig(decode);
     let mut errors = Vec::new();
     let start = Instant::now();
     loop {
@@ -99,4 +106,35 @@ fn a_thread_that_died_is_an_error() {
     let (states, _, alive) = load(nothing, |_, residency| residency.resident() == 4);
     assert_eq!(states, [NodeState::Resident; 4]);
     alive.unwrap();
+}
+
+#[test]
+fn nothing_is_loaded_while_the_thread_stands_still_and_all_of_it_afterwards() {
+    let (_folder, residency, thread) = rig(nothing);
+    let ask = || {
+        let mut residency = residency.lock().unwrap();
+        residency.begin_frame();
+        residency.set_priorities(&[(0, 9.0), (1, 3.0), (2, 2.0), (3, 1.0)], &[]);
+        drop(residency);
+        thread.wake();
+    };
+    let known = || {
+        let residency = residency.lock().unwrap();
+        (residency.counters().read_bytes, residency.resident())
+    };
+    let still = thread.still().unwrap();
+    ask();
+    let before = known();
+    thread.wake();
+    std::thread::sleep(2 * LONGEST_SLEEP);
+    assert_eq!(known(), before);
+    drop(still);
+    let start = Instant::now();
+    while known().1 < 4 && start.elapsed() < PATIENCE {
+        ask();
+        std::thread::sleep(Duration::from_micros(200));
+    }
+    assert!(known().0 > before.0 && known().1 == 4);
+    // Standing still waits for what is under way, and not for ever.
+    drop(thread.still().unwrap());
 }

@@ -1,0 +1,120 @@
+//! How far what is drawn is from what could be.
+
+use image::RgbaImage;
+
+use crate::Result;
+use crate::camera::View;
+
+/// How far the picture of a frame is from that of the leaves alone.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Accuracy {
+    /// FLIP over all pixels, 0 (no difference) to 1.
+    pub flip_mean: f64,
+    /// FLIP that 95 of 100 pixels do not exceed.
+    pub flip_p95: f64,
+    /// Mean squared error of sRGB values, 0 to 65,025; PSNR follows from it.
+    pub squared_error: f64,
+    /// Structural similarity, 1 where there is no difference; `None` of pictures smaller than its
+    /// window.
+    pub ssim: Option<f64>,
+    /// Pixels with surface in the picture of the leaves.
+    pub reference_pixels: u64,
+    /// Of these, pixels with background in that of the frame.
+    pub gap_pixels: u64,
+    /// Of these, pixels that are further within the outline of the leaves than the levels drawn
+    /// may be off: background seen through the model.
+    pub inner_gap_pixels: u64,
+    /// Pixels with surface where the leaves have background.
+    pub extra_pixels: u64,
+    /// FLIP between the picture and the same view with the levels of the frame before: the pop
+    /// that a user sees. `None` where nothing toggled.
+    pub pop_flip: Option<f64>,
+}
+
+impl Accuracy {
+    /// Peak signal-to-noise ratio in decibels; infinite where there is no difference.
+    pub fn psnr_db(&self) -> f64 {
+        crate::picture_error::psnr(self.squared_error)
+    }
+
+    /// Its columns of `frames.csv`.
+    pub(super) const COLUMNS: [&str; 9] = [
+        "flip_mean",
+        "flip_p95",
+        "psnr_db",
+        "ssim",
+        "reference_pixels",
+        "gap_pixels",
+        "inner_gap_pixels",
+        "extra_pixels",
+        "pop_flip",
+    ];
+
+    /// Its fields in the order of the columns.
+    pub(super) fn fields(&self) -> [String; 9] {
+        let optional = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
+        [
+            self.flip_mean.to_string(),
+            self.flip_p95.to_string(),
+            self.psnr_db().to_string(),
+            optional(self.ssim),
+            self.reference_pixels.to_string(),
+            self.gap_pixels.to_string(),
+            self.inner_gap_pixels.to_string(),
+            self.extra_pixels.to_string(),
+            optional(self.pop_flip),
+        ]
+    }
+}
+
+/// Looks at frames beside a run, which it does not change.
+pub trait Witness {
+    /// Whether it looks at this frame of the path.
+    fn wants(&self, index: usize) -> bool;
+
+    /// Looks at a frame that is over.
+    fn look(&mut self, frame: Sighting<'_>) -> Result<Accuracy>;
+}
+
+/// A frame that is over.
+#[derive(Debug)]
+pub struct Sighting<'a> {
+    /// Its number in the path.
+    pub frame: u64,
+    /// The camera.
+    pub view: &'a View,
+    /// What was drawn.
+    pub front: &'a [u32],
+    /// What was drawn in the frame before, where levels toggled since.
+    pub before: Option<&'a [u32]>,
+    /// The picture, alpha 0 where nothing was drawn; `None` where the run drew none.
+    pub drawn: Option<RgbaImage>,
+}
+
+/// One of the frames that are furthest from their reference, as pictures for a report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WorstFrame {
+    /// Its number in the path.
+    pub frame: u64,
+    /// How far off it is.
+    pub accuracy: Accuracy,
+    /// What was drawn, as JPEG.
+    pub drawn: Vec<u8>,
+    /// The leaves alone, as JPEG.
+    pub reference: Vec<u8>,
+    /// FLIP at each pixel, as JPEG.
+    pub difference: Vec<u8>,
+}
+
+/// How a run was compared with the leaves.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReferenceContext {
+    /// Every so many frames.
+    pub every: u64,
+    /// The graphics adapter that drew the leaves.
+    pub adapter: serde_json::Value,
+    /// Files that it could not use, each with what was wrong.
+    pub broken: Vec<String>,
+    /// The frames that are furthest off, worst first.
+    pub worst: Vec<WorstFrame>,
+}

@@ -1,0 +1,162 @@
+//! What the leaves alone look like, drawn beside a run and outside of its time.
+
+mod painter;
+mod reach;
+
+use image::{GrayImage, Luma, Rgb, RgbImage, RgbaImage};
+
+use super::accuracy::{Accuracy, ReferenceContext, Sighting, Witness, WorstFrame};
+use super::session::Session;
+use crate::camera::View;
+use crate::picture_error::{Gaps, PIXELS_PER_DEGREE, flip, mean_squared_error, ssim};
+use crate::render::RenderOptions;
+use crate::runtime::{SceneTree, front_before};
+use crate::{Error, Result};
+pub use painter::Painter;
+use reach::Reach;
+
+/// Bytes that a reference holds, beside those of the run.
+const CAP_BYTES: u64 = 512 << 20;
+/// Frames that are kept as pictures.
+const WORST: usize = 3;
+/// Quality of these pictures, 1–100.
+const QUALITY: u8 = 85;
+
+/// Compares every so many frames of a run with the same view of the leaves.
+pub struct Reference {
+    painter: Painter,
+    leaves: Vec<u32>,
+    every: u64,
+    worst: Vec<WorstFrame>,
+}
+
+impl Reference {
+    /// Every `every` frames, at least 1, beginning with the first. `options` are those of the
+    /// run.
+    pub fn new(session: &Session, options: &RenderOptions, every: u64) -> Result<Self> {
+        let tree = session.tree();
+        let leaves =
+            (0..tree.len() as u32).filter(|&node| tree.children(node).is_empty()).collect();
+        let painter = Painter::new(session, options, CAP_BYTES)?;
+        Ok(Self { painter, leaves, every: every.max(1), worst: Vec::new() })
+    }
+
+    /// What a summary and a report say of it.
+    pub fn context(self) -> Result<ReferenceContext> {
+        let adapter = serde_json::to_value(self.painter.adapter())
+            .map_err(|error| Error::Internal(format!("an adapter without JSON form: {error}")))?;
+        let mut broken: Vec<String> = self.painter.broken().cloned().collect();
+        broken.dedup();
+        Ok(ReferenceContext { every: self.every, adapter, broken, worst: self.worst })
+    }
+
+    /// Keeps a frame as pictures where it is one of the worst.
+    fn keep(
+        &mut self,
+        frame: u64,
+        accuracy: &Accuracy,
+        [drawn, reference, difference]: [&RgbImage; 3],
+    ) -> Result<()> {
+        let flip = accuracy.flip_mean;
+        let place = self.worst.partition_point(|worst| worst.accuracy.flip_mean >= flip);
+        if place >= WORST || flip == 0.0 {
+            return Ok(());
+        }
+        self.worst.truncate(WORST - 1);
+        let worst = WorstFrame {
+            frame,
+            accuracy: accuracy.clone(),
+            drawn: jpeg(drawn)?,
+            reference: jpeg(reference)?,
+            difference: jpeg(difference)?,
+        };
+        self.worst.insert(place, worst);
+        Ok(())
+    }
+}
+
+impl Witness for Reference {
+    fn wants(&self, index: usize) -> bool {
+        (index as u64).is_multiple_of(self.every)
+    }
+
+    fn look(&mut self, sighting: Sighting<'_>) -> Result<Accuracy> {
+        let Sighting { frame, view, front, before, drawn } = sighting;
+        let pose = &view.pose;
+        let drawn = match drawn {
+            Some(drawn) => drawn,
+            None => self.painter.paint(front, pose)?,
+        };
+        let leaves = seen(self.painter.tree(), &self.leaves, view);
+        let reference = self.painter.paint(&leaves, pose)?;
+        let gaps = Gaps::between(&surface(&reference), &surface(&drawn)).ok_or_else(other_size)?;
+        let inner = if gaps.gaps.is_empty() {
+            Vec::new()
+        } else {
+            let depths = self.painter.depths()?;
+            let reach = Reach::new(self.painter.tree(), front, view);
+            let width = view.size[0] as usize;
+            gaps.inner(|[x, y]| {
+                reach.at([x, y], f64::from(depths[y as usize * width + x as usize]))
+            })
+        };
+        let pictures = [&drawn, &reference].map(opaque);
+        let [picture, expected] = &pictures;
+        let map = flip(expected, picture, PIXELS_PER_DEGREE).ok_or_else(other_size)?;
+        let mut accuracy = Accuracy {
+            flip_mean: map.mean(),
+            flip_p95: map.percentile(95.0),
+            squared_error: mean_squared_error(expected, picture).ok_or_else(other_size)?,
+            ssim: ssim(expected, picture),
+            reference_pixels: gaps.reference_pixels,
+            gap_pixels: gaps.gaps.len() as u64,
+            inner_gap_pixels: inner.len() as u64,
+            extra_pixels: gaps.extra_pixels,
+            pop_flip: None,
+        };
+        if let Some(before) = before {
+            let before = front_before(self.painter.tree(), before, front);
+            let before = opaque(&self.painter.paint(&before, pose)?);
+            let pop = flip(&before, picture, PIXELS_PER_DEGREE).ok_or_else(other_size)?;
+            accuracy.pop_flip = Some(pop.mean());
+        }
+        self.keep(frame, &accuracy, [picture, expected, &map.picture()])?;
+        Ok(accuracy)
+    }
+}
+
+/// Those of `nodes` that a camera sees.
+fn seen(tree: &SceneTree, nodes: &[u32], view: &View) -> Vec<u32> {
+    let inside = |&node: &u32| view.frustum.outside(tree.node(node).bbox) <= 0.0;
+    nodes.iter().copied().filter(inside).collect()
+}
+
+/// Colours alone.
+fn opaque(picture: &RgbaImage) -> RgbImage {
+    RgbImage::from_fn(picture.width(), picture.height(), |x, y| {
+        let [r, g, b, _] = picture.get_pixel(x, y).0;
+        Rgb([r, g, b])
+    })
+}
+
+/// Where surface is.
+fn surface(picture: &RgbaImage) -> GrayImage {
+    GrayImage::from_fn(picture.width(), picture.height(), |x, y| {
+        Luma([picture.get_pixel(x, y).0[3]])
+    })
+}
+
+fn other_size() -> Error {
+    Error::Internal("two pictures of one view have different sizes".into())
+}
+
+fn jpeg(picture: &RgbImage) -> Result<Vec<u8>> {
+    let failed = |what: String| Error::Internal(format!("a frame as JPEG: {what}"));
+    let side = |side: u32| u16::try_from(side).map_err(|error| failed(error.to_string()));
+    let (width, height) = (side(picture.width())?, side(picture.height())?);
+    let mut bytes = Vec::new();
+    jpeg_encoder::Encoder::new(&mut bytes, QUALITY)
+        .encode(picture.as_raw(), width, height, jpeg_encoder::ColorType::Rgb)
+        .map_err(|error| failed(error.to_string()))?;
+    Ok(bytes)
+}

@@ -1,0 +1,380 @@
+//! `hlod-bench OUT PATH.csv`: arguments in, exit code out.
+
+mod run_args;
+
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use hlod::bench::{
+    BenchOptions, ClockConstants, Context, FrameRecord, Limits, Run, Session, Size, SummaryFile,
+    Sweep, check_output, compare, summary, summary_text, write_run,
+};
+use hlod::camera::{self, CameraPath, DEFAULT_FPS, Ground, PathKind};
+use hlod::{Error, Result};
+use indicatif::{ProgressBar, ProgressStyle};
+use run_args::{Clock, RunArgs, parse_size};
+
+/// Replays a camera path over a built scene and logs what a user would have felt.
+///
+/// Chooses levels of detail for every frame as Lakhia's thesis (2004) describes, loads nodes
+/// beside drawing below a memory cap, draws offscreen, and writes frames.csv, summary.json and
+/// report.html into the folder --out.
+#[derive(Parser, Debug)]
+#[command(
+    version,
+    allow_negative_numbers = true,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    override_usage = "hlod-bench [OPTIONS] OUT PATH.csv\n       hlod-bench make-path [OPTIONS] OUT --kind KIND --out PATH.csv\n       hlod-bench calibrate [OPTIONS] OUT --out CLOCK.json\n       hlod-bench sweep [OPTIONS] OUT PATH.csv --targets MS,MS\n       hlod-bench compare [OPTIONS] BASE.json NEW.json",
+    after_help = "Examples:\n  hlod-bench make-path out/ --kind walk --out walk.csv\n  hlod-bench out/ walk.csv --target-ms 30\n  hlod-bench out/ walk.csv --clock model --max-memory 256MiB --out bench/walk\n\nExit codes: 0 success, 1 internal error, 2 usage, 3 input missing or invalid (also where a run went on without a node file that cannot be used), 4 output not written, 5 no graphics adapter, 6 compare: a limit was exceeded."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Writes a camera path for a built scene
+    MakePath {
+        /// The output folder of hlod-build
+        scene: PathBuf,
+        /// walk and drive: along the streets at 1.5 and 15 m/s; fly: from a street up and over
+        /// the city; orbit: a circle and two passes through the middle; still: standing;
+        /// shake: swaying a little
+        #[arg(long, value_enum)]
+        kind: PathKind,
+        /// Frames, 1 or more [default: what suits the kind]
+        #[arg(long, value_name = "N")]
+        frames: Option<usize>,
+        /// Frames a second
+        #[arg(long, value_name = "FPS", default_value_t = DEFAULT_FPS)]
+        fps: f64,
+        /// Another seed gives another route
+        #[arg(long, value_name = "SEED", default_value_t = 0)]
+        seed: u64,
+        /// The file to write
+        #[arg(long, value_name = "PATH.csv")]
+        out: PathBuf,
+    },
+    /// Compares two runs; exit code 6 where a limit is exceeded
+    Compare {
+        /// summary.json of the run to compare with
+        base: PathBuf,
+        /// summary.json of the run in question
+        new: PathBuf,
+        /// Compare runs over different scenes, paths or parameters all the same
+        #[arg(long)]
+        force: bool,
+        /// One JSON object instead of a table
+        #[arg(long)]
+        json: bool,
+        #[command(flatten)]
+        limits: Box<Limits>,
+    },
+    /// Replays a path at several targets: image error against frame time, in sweep.csv and
+    /// sweep.html, beside a folder for each run
+    Sweep {
+        /// Milliseconds that a frame may take, above 0, one run each
+        #[arg(long, value_name = "MS,MS", value_delimiter = ',', default_value = "5,10,20,30,60")]
+        targets: Vec<f64>,
+        /// As for one run; --reference-every is 10 unless given
+        #[command(flatten)]
+        run: Box<RunArgs>,
+    },
+    /// Measures the constants of the model clock on this machine
+    Calibrate {
+        /// The output folder of hlod-build
+        scene: PathBuf,
+        /// Which graphics adapter: part of its name, or its number
+        #[arg(long, value_name = "NAME")]
+        adapter: Option<String>,
+        /// Width and height of the picture in pixels
+        #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
+        size: Size,
+        /// The file to write, for --constants
+        #[arg(long, value_name = "CLOCK.json")]
+        out: PathBuf,
+    },
+}
+
+/// Keeps Mesa's device selection from asking for a display, of which there need be none, and from
+/// writing to the console that it found none. It only matters which of several cards comes first,
+/// and that is chosen here by `--adapter`.
+fn hush_device_selection() {
+    const SWITCH: &str = "NODEVICE_SELECT";
+    if std::env::var_os(SWITCH).is_none() && std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        // SAFETY: called before anything else in `main`, while there is no other thread that
+        // could read the environment.
+        unsafe { std::env::set_var(SWITCH, "1") };
+    }
+}
+
+fn main() -> ExitCode {
+    hush_device_selection();
+    let cli = Cli::parse();
+    let done = match cli.command {
+        Some(Command::Compare { base, new, force, json, limits }) => {
+            match compare_runs(&base, &new, &limits, force, json) {
+                Ok(true) => return ExitCode::from(LIMIT_EXCEEDED),
+                done => done.map(drop),
+            }
+        }
+        Some(Command::MakePath { scene, kind, frames, fps, seed, out }) => {
+            make_path(&scene, kind, frames, fps, seed, &out)
+        }
+        Some(Command::Calibrate { scene, adapter, size, out }) => {
+            calibrate(&scene, adapter, size, &out)
+        }
+        Some(Command::Sweep { targets, run }) => sweep(&targets, &run),
+        None => replay(&cli.run),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("hlod-bench: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// The exit code of a comparison that exceeded its limits.
+const LIMIT_EXCEEDED: u8 = 6;
+
+/// True where a limit was exceeded.
+fn compare_runs(base: &Path, new: &Path, limits: &Limits, force: bool, json: bool) -> Result<bool> {
+    let (base, new) = (SummaryFile::read(base)?, SummaryFile::read(new)?);
+    let comparison = compare(&base, &new, limits, force)?;
+    let text = if json { format!("{:#}\n", comparison.to_json()) } else { comparison.text() };
+    print(&text)?;
+    Ok(comparison.exceeded())
+}
+
+fn make_path(
+    dir: &Path,
+    kind: PathKind,
+    frames: Option<usize>,
+    fps: f64,
+    seed: u64,
+    out: &Path,
+) -> Result<()> {
+    let session = Session::open(dir)?;
+    let ground = Ground::read(session.scene(), dir)?;
+    let frames = frames.unwrap_or(kind.default_frames());
+    let path = camera::make_path(&ground, kind, frames, fps, seed)?;
+    camera::write_path(&path, out)?;
+    print(&format!("{} frames written to {}\n", path.frames.len(), out.display()))
+}
+
+fn replay(arguments: &RunArgs) -> Result<()> {
+    let (_, unusable) = replay_once(arguments)?;
+    unusable.map_or(Ok(()), Err)
+}
+
+/// Frames between those that a sweep compares with the leaves.
+const SWEEP_EVERY: u64 = 10;
+
+fn sweep(targets: &[f64], arguments: &RunArgs) -> Result<()> {
+    if arguments.target_ms.is_some() {
+        return Err(Error::Usage("--target-ms: a sweep has --targets".into()));
+    }
+    let mut sweep = Sweep::default();
+    let mut first_unusable = None;
+    for &target in targets {
+        let mut run = arguments.clone();
+        run.target_ms = Some(target);
+        run.reference_every.get_or_insert(SWEEP_EVERY);
+        run.out = arguments.out.join(format!("target-{target}"));
+        let (summary, unusable) = replay_once(&run)?;
+        sweep.summaries.push(summary);
+        first_unusable = first_unusable.or(unusable);
+    }
+    let name =
+        |path: &Option<PathBuf>| path.as_deref().unwrap_or(Path::new("")).display().to_string();
+    let title = format!("{} along {}", name(&arguments.scene), name(&arguments.path));
+    let files = sweep.write(&arguments.out, &title)?;
+    if !arguments.quiet {
+        let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        print(&format!("{}\nwritten: {}\n", sweep.text(), files.join(", ")))?;
+    }
+    first_unusable.map_or(Ok(()), Err)
+}
+
+/// One run, written and told of: its summary, and what is to be said of files that it could not
+/// use.
+fn replay_once(arguments: &RunArgs) -> Result<(serde_json::Value, Option<Error>)> {
+    let (Some(dir), Some(path)) = (&arguments.scene, &arguments.path) else {
+        return Err(Error::Usage("expected OUT and PATH.csv".into()));
+    };
+    let session = Session::open(dir)?;
+    let path_name = path.display().to_string();
+    let path = camera::read_path(path, session.scene().up)?;
+    let constants = arguments.constants.as_deref().map(ClockConstants::read).transpose()?;
+    let options = arguments.options(&session);
+    options.check()?;
+    check_output(&arguments.out)?;
+    let bar = Bar::new(arguments.quiet, path.frames.len());
+    let (run, mut context) = run(arguments, &session, &path, options, constants, &bar)?;
+    bar.bar.finish_and_clear();
+    context.path_name = path_name;
+    let summary = summary(&run, &context);
+    let files = write_run(&arguments.out, &run, &context, &summary)?;
+    if !arguments.quiet {
+        let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        print(&format!("{}\nwritten: {}\n", summary_text(&summary), files.join(", ")))?;
+    }
+    let unusable = context.broken.first().map(|first| {
+        let files = match context.broken.len() {
+            1 => "1 file".to_owned(),
+            count => format!("{count} files"),
+        };
+        let what = "that cannot be used; build again. The first:";
+        Error::input(dir, format!("the run went on without {files} {what} {first}"))
+    });
+    Ok((summary, unusable))
+}
+
+#[cfg(feature = "render")]
+fn run(
+    arguments: &RunArgs,
+    session: &Session,
+    path: &CameraPath,
+    options: BenchOptions,
+    constants: Option<ClockConstants>,
+    bar: &Bar,
+) -> Result<(Run, Context)> {
+    use hlod::bench::{Reference, Snapshots, Witness};
+    use hlod::render::{RenderOptions, Renderer, Shading};
+    use run_args::ShadingArg;
+    let render = RenderOptions {
+        size: options.size.0,
+        adapter: arguments.adapter.clone(),
+        shading: match arguments.shading {
+            ShadingArg::Photo => Shading::Photo,
+            ShadingArg::HeadLight => Shading::HeadLight,
+            ShadingArg::Unlit => Shading::Unlit,
+        },
+        show_levels: arguments.show_levels,
+        cull: arguments.cull,
+        ..RenderOptions::default()
+    };
+    let reference = |every| Reference::new(session, &render, every);
+    let mut reference = arguments.reference_every.map(reference).transpose()?;
+    let witness = reference.as_mut().map(|reference| reference as &mut dyn Witness);
+    let progress = |frame: &FrameRecord| bar.frame(frame);
+    let (run, mut context) = match arguments.clock {
+        Clock::Model => {
+            let constants = constants.unwrap_or_default();
+            session.run_model(path, options, constants, witness, progress)?
+        }
+        Clock::Wall => {
+            let mut renderer = Renderer::new(&render)?;
+            let dir = arguments.out.join("snapshots");
+            let snapshots = arguments.snapshots.map(|every| Snapshots { every, dir });
+            session.run_wall(
+                path,
+                options,
+                constants,
+                &mut renderer,
+                snapshots,
+                witness,
+                progress,
+            )?
+        }
+    };
+    context.reference = reference.map(Reference::context).transpose()?;
+    let found = context.reference.iter().flat_map(|reference| &reference.broken);
+    let more: Vec<String> = found.filter(|what| !context.broken.contains(what)).cloned().collect();
+    context.broken.extend(more);
+    Ok((run, context))
+}
+
+#[cfg(feature = "render")]
+fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Result<()> {
+    use hlod::render::{RenderOptions, Renderer};
+    let session = Session::open(dir)?;
+    let mut renderer =
+        Renderer::new(&RenderOptions { size: size.0, adapter, ..RenderOptions::default() })?;
+    let ground = Ground::read(session.scene(), dir)?;
+    let kind = PathKind::Fly;
+    let path = camera::make_path(&ground, kind, kind.default_frames(), DEFAULT_FPS, 0)?;
+    let constants = session.calibrate(&path, &mut renderer)?;
+    constants.write(out)?;
+    print(&format!(
+        "an empty frame    {:.2} ms\na unit of cost    {:.6} ms\nthe whole picture {:.0} units of cost\na node            {:.4} ms\n\
+         loading           {:.1} MB/s\nc_textured        {:.3}\nwritten: {}\n",
+        constants.fixed_ms,
+        constants.ms_per_cost,
+        constants.fill_cost,
+        constants.ms_per_node,
+        constants.load_bytes_per_ms / 1e3,
+        constants.textured_weight,
+        out.display()
+    ))
+}
+
+#[cfg(not(feature = "render"))]
+fn run(
+    arguments: &RunArgs,
+    session: &Session,
+    path: &CameraPath,
+    options: BenchOptions,
+    constants: Option<ClockConstants>,
+    bar: &Bar,
+) -> Result<(Run, Context)> {
+    if arguments.clock == Clock::Wall || arguments.reference_every.is_some() {
+        return Err(cannot_draw());
+    }
+    let constants = constants.unwrap_or_default();
+    session.run_model(path, options, constants, None, |frame| bar.frame(frame))
+}
+
+#[cfg(not(feature = "render"))]
+fn calibrate(_: &Path, _: Option<String>, _: Size, _: &Path) -> Result<()> {
+    Err(cannot_draw())
+}
+
+#[cfg(not(feature = "render"))]
+fn cannot_draw() -> Error {
+    Error::NoAdapter("this hlod-bench was compiled without drawing; use --clock model alone".into())
+}
+
+/// Progress on a terminal, and nothing elsewhere.
+struct Bar {
+    bar: ProgressBar,
+}
+
+impl Bar {
+    fn new(quiet: bool, frames: usize) -> Self {
+        let hidden = quiet || !std::io::stderr().is_terminal();
+        let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(frames as u64) };
+        let template = "{wide_bar} {pos}/{len} frames, {msg}, {eta} left";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        Self { bar }
+    }
+
+    fn frame(&self, frame: &FrameRecord) -> bool {
+        self.bar.inc(1);
+        if !self.bar.is_hidden() {
+            self.bar
+                .set_message(format!("{:.1} ms, {} triangles", frame.frame_ms, frame.triangles));
+        }
+        true
+    }
+}
+
+/// Writes to the standard output; a reader that went away is none of our business.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::output("standard output", error.to_string()))
+        }
+        _ => Ok(()),
+    }
+}

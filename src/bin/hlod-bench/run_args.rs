@@ -1,0 +1,195 @@
+//! What can be asked of a run.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use hlod::bench::{BenchOptions, Pace, Session, Size};
+use hlod::runtime::lakhia::{LakhiaOptions, ShareFeedback, StartOfHysteresis};
+use hlod::runtime::residency::ResidencyOptions;
+
+/// What a frame may take unless that is said.
+const TARGET_MS: f64 = 30.0;
+
+/// A scene, a path, and all that determines a run.
+#[derive(Args, Clone, Debug)]
+pub struct RunArgs {
+    /// The output folder of hlod-build
+    #[arg(required = true)]
+    pub scene: Option<PathBuf>,
+    /// The path: frame,time_s,x,y,z,qx,qy,qz,qw,fov_y_deg
+    #[arg(required = true, value_name = "PATH.csv")]
+    pub path: Option<PathBuf>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "bench")]
+    pub out: PathBuf,
+    /// `wall` draws and measures; `model` takes times from a model, needs no graphics adapter and
+    /// gives the same on every machine
+    #[arg(long, value_enum, default_value_t = Clock::Wall)]
+    pub clock: Clock,
+    /// Constants that `calibrate` wrote [default: wall: measured at the start; model: built in]
+    #[arg(long, value_name = "CLOCK.json")]
+    pub constants: Option<PathBuf>,
+    /// `recorded`: a frame begins no sooner than the path has it; `unthrottled`: at once
+    #[arg(long, value_enum, default_value_t = Pace::Recorded)]
+    pub pace: Pace,
+    /// Frames for which the camera stands at the first pose before the log begins
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub settle_frames: u64,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    pub quiet: bool,
+
+    /// c_targetTime: milliseconds that a frame may take, above 0 [default: 30]
+    #[arg(long, value_name = "MS", help_heading = "Selection")]
+    pub target_ms: Option<f64>,
+    /// c_vis: what being in view adds to a node's benefit, 0 or more
+    #[arg(long, value_name = "C", default_value_t = 1.275, help_heading = "Selection")]
+    pub vis: f64,
+    /// c_fore: how much the angle counts at which a node is seen, 0-1
+    #[arg(long, value_name = "C", default_value_t = 0.45, help_heading = "Selection")]
+    pub fore: f64,
+    /// c_hystSwitch: how far a counter goes before it counts. More: fewer and later switches
+    #[arg(long, value_name = "C", default_value_t = 1500.0, help_heading = "Selection")]
+    pub hyst_switch: f64,
+    /// c_hystLimit: how far counters go at most, --hyst-switch or more
+    #[arg(long, value_name = "C", default_value_t = 4510.0, help_heading = "Selection")]
+    pub hyst_limit: f64,
+    /// Where counters begin: `affordable` lets nodes in at once only where their time suffices
+    #[arg(long, value_enum, default_value_t = StartOfHysteresis::Affordable, help_heading = "Selection")]
+    pub hyst_start: StartOfHysteresis,
+    /// Seconds by which the camera is moved on before distances are taken
+    #[arg(long, value_name = "S", default_value_t = 0.5, help_heading = "Selection")]
+    pub lookahead: f64,
+    /// Metres; what is nearer counts as this near [default: 1, less in scenes below 100 m]
+    #[arg(long, value_name = "M", help_heading = "Selection")]
+    pub least_distance: Option<f64>,
+    /// Draw children only where all of them are in memory, not only those in view
+    #[arg(long, help_heading = "Selection")]
+    pub all_siblings: bool,
+    /// By what part v_time follows the last frame, 0-1; 0 turns this feedback off
+    #[arg(long, value_name = "PART", default_value_t = 0.1, help_heading = "Selection")]
+    pub v_time_gain: f64,
+    /// By what part shareTime changes in a frame, 0-1; 0 turns this feedback off
+    #[arg(long, value_name = "PART", default_value_t = 0.01, help_heading = "Selection")]
+    pub share_gain: f64,
+    /// The part of the target by which frames must miss it before shareTime changes
+    #[arg(long, value_name = "PART", default_value_t = 0.05, help_heading = "Selection")]
+    pub share_slack: f64,
+    /// How many times the time for nodes shareTime may be, 1 or more. More: finer where little is
+    /// in view, and later back on target when more comes
+    #[arg(long, value_name = "TIMES", default_value_t = 10.0, help_heading = "Selection")]
+    pub share_limit: f64,
+    /// `plain` as the thesis words it, which swings; `damped` waits for what is on its way
+    #[arg(long, value_enum, default_value_t = ShareFeedback::Damped, help_heading = "Selection")]
+    pub share_feedback: ShareFeedback,
+
+    /// maxMemory: the most bytes in use, loads under way included; with KiB, MiB or GiB
+    #[arg(long, value_name = "BYTES", default_value = "1GiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
+    pub max_memory: u64,
+    /// Bytes read before looking again at what matters most
+    #[arg(long, value_name = "BYTES", default_value = "64KiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
+    pub portion: u64,
+    /// Bytes that become resident in a frame; one node always does
+    #[arg(long, value_name = "BYTES", default_value = "4MiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
+    pub upload: u64,
+    /// A node makes room only for one whose priority is higher by this part
+    #[arg(long, value_name = "PART", default_value_t = 0.1, help_heading = "Memory and loading")]
+    pub evict_margin: f64,
+
+    /// Width and height of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size, help_heading = "Drawing")]
+    pub size: Size,
+    /// Which graphics adapter: part of its name, or its number
+    #[arg(long, value_name = "NAME", help_heading = "Drawing")]
+    pub adapter: Option<String>,
+    /// Write every Nth frame as PNG into DIR/snapshots, N 1 or more
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Drawing")]
+    pub snapshots: Option<u64>,
+    /// Draw every Nth frame from the leaves too, outside of its time, and log how far it is from
+    /// that: FLIP, PSNR, SSIM, gaps, and the pop where levels toggled. N 1 or more
+    #[arg(long, value_name = "N", conflicts_with = "show_levels", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Drawing")]
+    pub reference_every: Option<u64>,
+    /// Tint nodes by level
+    #[arg(long, help_heading = "Drawing")]
+    pub show_levels: bool,
+    /// `photo`: pictures as they are; `head-light`: lit from behind the viewer; `unlit`
+    #[arg(long, value_enum, default_value_t = ShadingArg::Photo, help_heading = "Drawing")]
+    pub shading: ShadingArg,
+    /// Leave away the backs of triangles that are not double-sided
+    #[arg(long, help_heading = "Drawing")]
+    pub cull: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Clock {
+    Wall,
+    Model,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ShadingArg {
+    Photo,
+    HeadLight,
+    Unlit,
+}
+
+/// A number of bytes, with or without KiB, MiB or GiB.
+fn parse_bytes(text: &str) -> Result<u64, String> {
+    let units = [("KiB", 10), ("MiB", 20), ("GiB", 30), ("K", 10), ("M", 20), ("G", 30), ("B", 0)];
+    let (number, shift) = units
+        .iter()
+        .find_map(|&(unit, shift)| text.strip_suffix(unit).map(|number| (number, shift)))
+        .unwrap_or((text, 0));
+    let wanted = "expected bytes such as 1048576, 512MiB or 1.5GiB";
+    let number: f64 = number.trim().parse().map_err(|_| wanted.to_owned())?;
+    let bytes = number * f64::from(1u32 << shift);
+    if bytes.is_finite() && (0.0..=1e18).contains(&bytes) {
+        Ok(bytes as u64)
+    } else {
+        Err(wanted.to_owned())
+    }
+}
+
+pub fn parse_size(text: &str) -> Result<Size, String> {
+    let wanted = "expected width and height in pixels, such as 1280x720";
+    let (width, height) = text.split_once('x').ok_or(wanted)?;
+    let side = |text: &str| match text.parse::<u32>() {
+        Ok(side @ 1..=16384) => Ok(side),
+        _ => Err(wanted),
+    };
+    Ok(Size([side(width)?, side(height)?]))
+}
+
+impl RunArgs {
+    pub fn options(&self, session: &Session) -> BenchOptions {
+        let least = (session.tree().diagonal() / 100.0).clamp(1e-6, 1.0);
+        BenchOptions {
+            selection: LakhiaOptions {
+                target_ms: self.target_ms.unwrap_or(TARGET_MS),
+                vis: self.vis,
+                fore: self.fore,
+                hyst_switch: self.hyst_switch,
+                hyst_limit: self.hyst_limit,
+                hyst_start: self.hyst_start,
+                lookahead_s: self.lookahead,
+                least_distance: self.least_distance.unwrap_or(least),
+                all_siblings: self.all_siblings,
+                v_time_gain: self.v_time_gain,
+                share_gain: self.share_gain,
+                share_slack: self.share_slack,
+                share_limit: self.share_limit,
+                share_feedback: self.share_feedback,
+                ..LakhiaOptions::default()
+            },
+            residency: ResidencyOptions {
+                max_memory_bytes: self.max_memory,
+                portion_bytes: self.portion,
+                upload_bytes: self.upload,
+                evict_margin: self.evict_margin,
+            },
+            pace: self.pace,
+            size: self.size,
+            settle_frames: self.settle_frames,
+        }
+    }
+}

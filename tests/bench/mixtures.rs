@@ -1,0 +1,180 @@
+//! Closed cities show no background through them, whatever levels stand beside each other, close
+//! and from far away.
+
+use std::path::Path;
+
+use glam::DVec3;
+use hlod::bench::{Accuracy, Reference, Session, Sighting, Witness};
+use hlod::camera::{Ground, PathKind, Pose, View, from_angles, make_path};
+use hlod::city::{CityOptions, TextureSize};
+use hlod::error::Error;
+use hlod::mesh::UpAxis;
+use hlod::render::RenderOptions;
+use hlod::runtime::SceneTree;
+
+use crate::bench_support::build_options;
+use crate::support::build_with;
+use crate::support::inputs::write_city;
+
+const SIZE: [u32; 2] = [640, 360];
+
+/// Closed blocks of four levels.
+fn closed_city(folder: &Path) -> Session {
+    let options = CityOptions {
+        blocks: 4,
+        triangles: 40_000,
+        texture: TextureSize::None,
+        watertight: true,
+        seed: 3,
+        ..CityOptions::default()
+    };
+    let out = folder.join("out");
+    build_with(&[write_city(folder, &options)], &out, &build_options(250));
+    Session::open(&out).unwrap()
+}
+
+/// `None` where there is no adapter and none is required.
+fn reference(session: &Session) -> Option<Reference> {
+    let options = RenderOptions { size: SIZE, ..RenderOptions::default() };
+    match Reference::new(session, &options, 1) {
+        Ok(reference) => Some(reference),
+        Err(Error::NoAdapter(what)) => {
+            let required = std::env::var("HLOD_REQUIRE_GPU").is_ok_and(|value| value == "1");
+            assert!(!required, "a graphics adapter is required: {what}");
+            println!("skipped: {what}");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// From streets and from above, near and far.
+fn poses(session: &Session, out: &Path) -> Vec<Pose> {
+    let ground = Ground::read(session.scene(), out).unwrap();
+    let along = [(PathKind::Walk, 3), (PathKind::Fly, 4), (PathKind::Orbit, 3)].into_iter();
+    let along = along.flat_map(|(kind, count)| {
+        let frames = kind.default_frames();
+        let path = make_path(&ground, kind, frames, 30.0, 0).unwrap().frames;
+        (0..count).map(move |i| path[i * (path.len() - 1) / (count - 1)].pose)
+    });
+    along.chain(close_ups(session.tree(), 14)).collect()
+}
+
+/// Looking at some node from 3 to 100 m away and from any side but below, outside of all blocks.
+fn close_ups(tree: &SceneTree, count: usize) -> Vec<Pose> {
+    let mut random = random(9);
+    let mut poses = Vec::new();
+    while poses.len() < count {
+        let node = ((random() * tree.len() as f64) as u32).min(tree.len() as u32 - 1);
+        let [low, high] = tree.node(node).bbox;
+        let (yaw, pitch) = (random() * 360.0, -60.0 * random());
+        let rotation = from_angles(UpAxis::Z, yaw, pitch, 0.0);
+        let away = 3.0 * 33f64.powf(random());
+        let position = (low + high) / 2.0 - rotation * DVec3::NEG_Z * away;
+        let inside = |&root: &u32| {
+            let [low, high] = tree.node(root).bbox;
+            position.clamp(low - 1.0, high + 1.0) == position
+        };
+        if !tree.roots().iter().any(inside) {
+            poses.push(Pose { position, rotation, fov_y_deg: 60.0 });
+        }
+    }
+    poses
+}
+
+/// The nodes at which `stop` says so, by their place: the numbers of the children on the way to
+/// them, the root's first.
+fn front(tree: &SceneTree, mut stop: impl FnMut(&[u32]) -> bool) -> Vec<u32> {
+    let mut front = Vec::new();
+    let mut open: Vec<(u32, Vec<u32>)> =
+        tree.roots().iter().zip(0..).map(|(&root, number)| (root, vec![number])).collect();
+    while let Some((node, place)) = open.pop() {
+        let children = tree.children(node);
+        if children.is_empty() || stop(&place) {
+            front.push(node);
+        } else {
+            let below = children.iter().zip(0..);
+            open.extend(below.map(|(&child, number)| (child, [&place[..], &[number]].concat())));
+        }
+    }
+    front
+}
+
+/// A fixed sequence of numbers in 0–1.
+fn random(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((state >> 33) as f64) / (1u64 << 31) as f64
+    }
+}
+
+/// Fronts with neighbours as different as can be, random ones, and one level alone.
+fn fronts(tree: &SceneTree) -> Vec<(String, Vec<u32>)> {
+    let mut fronts = vec![("the roots".to_owned(), front(tree, |_| true))];
+    for parity in 0..2 {
+        // The coarsest that can stand beside leaves, within trees and from tree to tree.
+        let beside_leaves = |place: &[u32]| place.len() > 1 && place[1] % 2 == parity;
+        fronts.push((format!("level 1 beside leaves {parity}"), front(tree, beside_leaves)));
+        let roots = |place: &[u32]| place[0] % 2 == parity;
+        fronts.push((format!("roots beside leaves {parity}"), front(tree, roots)));
+        let checkerboard = |place: &[u32]| place.iter().sum::<u32>() % 2 == parity;
+        fronts.push((format!("checkerboard {parity}"), front(tree, checkerboard)));
+    }
+    for (share, seed) in [(0.2, 1), (0.4, 2), (0.6, 3)] {
+        let mut random = random(seed);
+        fronts.push((format!("random {share}"), front(tree, |_| random() < share)));
+    }
+    fronts
+}
+
+fn look(reference: &mut Reference, pose: &Pose, front: &[u32]) -> Accuracy {
+    let view = View::new(*pose, DVec3::ZERO, SIZE);
+    let sighting = Sighting { frame: 0, view: &view, front, before: None, drawn: None };
+    reference.look(sighting).unwrap()
+}
+
+#[test]
+fn closed_cities_show_no_background_through_any_mixture_of_levels() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = closed_city(folder.path());
+    let Some(mut reference) = reference(&session) else { return };
+    let tree = session.tree();
+    let levels = session.scene().level_count();
+    assert!(levels >= 4, "{levels} levels");
+    let poses = poses(&session, &folder.path().join("out"));
+    let (mut surface, mut gaps, mut extra, mut wrong) = (0, 0, 0, Vec::new());
+    for (name, front) in fronts(tree) {
+        for (number, pose) in poses.iter().enumerate() {
+            let found = look(&mut reference, pose, &front);
+            surface += found.reference_pixels;
+            gaps += found.gap_pixels;
+            extra += found.extra_pixels;
+            if found.inner_gap_pixels > 0 {
+                wrong.push((name.clone(), number, found.inner_gap_pixels, found.gap_pixels));
+            }
+        }
+    }
+    println!(
+        "{gaps} gap pixels, all at outlines but {wrong:?}, and {extra} too many, of {surface}"
+    );
+    assert!(surface > 10_000_000, "{surface} pixels");
+    assert!(wrong.is_empty(), "background through the model (front, view, pixels): {wrong:?}");
+
+    // The same catches a hole: leaves alone show no gap, and leaves without one of them do.
+    let leaves = front(tree, |_| false);
+    let (mut caught, mut seen) = (0, 0);
+    for pose in &poses {
+        let whole = look(&mut reference, pose, &leaves);
+        assert_eq!((whole.gap_pixels, whole.extra_pixels, whole.flip_mean), (0, 0, 0.0));
+        for missing in (0..leaves.len()).step_by(leaves.len() / 5) {
+            let mut holed = leaves.clone();
+            holed.remove(missing);
+            let found = look(&mut reference, pose, &holed);
+            seen += u64::from(found.flip_mean > 0.0);
+            caught += u64::from(found.inner_gap_pixels > 0);
+        }
+    }
+    println!("of {seen} views of a hole {caught} show background");
+    assert!(caught > 0, "no hole was found");
+}
