@@ -410,6 +410,20 @@ mod tests {
         }
     }
 
+    /// A side that leaves the other's outline between vertices that both have.
+    #[test]
+    fn a_side_across_a_shallow_notch_is_found() {
+        let corners = [[0.0, 0.0, 0.0], [20.0, 0.0, 0.0], [10.0, 15.0, 0.0], [7.3, 0.04, 0.0]];
+        let notched = mesh(&corners, &[[0, 3, 2], [3, 1, 2]]);
+        let straight = mesh(&corners[..3], &[[0, 1, 2]]);
+        // From the foot of the notch to the nearer of the notch's two sides.
+        let deepest = 0.04 * f64::cos(f64::atan(0.04 / 7.3));
+        for (source, simplified) in [(&notched, &straight), (&straight, &notched)] {
+            let bound = hausdorff(source, simplified);
+            assert!(bound >= deepest && bound <= deepest * ALLOWANCE + 1e-6, "{bound} {deepest}");
+        }
+    }
+
     #[test]
     fn the_bound_holds_for_points_all_over_both_surfaces() {
         let mut state = 3u32;
