@@ -335,7 +335,8 @@ impl TriangleGrid {
 }
 
 /// Squared distance from a point to a triangle, by the region of the plane that its projection
-/// falls in (Ericson, Real-Time Collision Detection, section 5.1.5).
+/// falls in (Ericson, Real-Time Collision Detection, section 5.1.5). Of needles it is that to
+/// their sides: they have no plane to speak of, and the distance to it could be anything.
 #[inline]
 fn squared_distance(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> f32 {
     let (ab, ac, ap) = (b - a, c - a, p - a);
@@ -349,7 +350,7 @@ fn squared_distance(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> f32 {
         return bp.length_squared();
     }
     let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 && d1 > d3 {
         return (ap - ab * (d1 / (d1 - d3))).length_squared();
     }
     let cp = p - c;
@@ -358,17 +359,31 @@ fn squared_distance(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> f32 {
         return cp.length_squared();
     }
     let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 && d2 > d6 {
         return (ap - ac * (d2 / (d2 - d6))).length_squared();
     }
     let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return (bp - (c - b) * t).length_squared();
+    let (from_b, from_c) = (d4 - d3, d5 - d6);
+    if va <= 0.0 && from_b >= 0.0 && from_c >= 0.0 && from_b + from_c > 0.0 {
+        return (bp - (c - b) * (from_b / (from_b + from_c))).length_squared();
     }
     let normal = ab.cross(ac);
-    let length = normal.length_squared();
-    if length > 0.0 { ap.dot(normal).powi(2) / length } else { ap.length_squared() }
+    let area = normal.length_squared();
+    if area > LEAST_SINE_SQUARED * ab.length_squared() * ac.length_squared() {
+        return ap.dot(normal).powi(2) / area;
+    }
+    to_side(p, a, b).min(to_side(p, b, c)).min(to_side(p, c, a))
+}
+
+/// A triangle that is narrower than this at its first corner has no normal that f32 could hold.
+const LEAST_SINE_SQUARED: f32 = 1e-4;
+
+/// Squared distance from a point to the line between two others.
+fn to_side(p: Vec3, a: Vec3, b: Vec3) -> f32 {
+    let (ab, ap) = (b - a, p - a);
+    let squared = ab.length_squared();
+    let along = if squared > 0.0 { (ab.dot(ap) / squared).clamp(0.0, 1.0) } else { 0.0 };
+    (ap - ab * along).length_squared()
 }
 
 #[cfg(test)]
@@ -459,6 +474,39 @@ mod tests {
             }
             assert!(f64::from(farthest) <= bound, "{farthest} {bound}");
             assert!(bound <= f64::from(farthest) * ALLOWANCE * 1.1, "{farthest} {bound}");
+        }
+    }
+
+    /// Against the nearest of many points of the triangle, none of which is nearer than it is.
+    #[test]
+    fn no_triangle_is_nearer_than_its_points() {
+        let mut state = 11u32;
+        let mut random = || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        for case in 0..400 {
+            let mut point = || Vec3::new(random() * 100.0, random() * 100.0, random() * 5.0);
+            let (p, a, far) = (point(), point(), point());
+            // A triangle, a needle, a line, two corners in one place, and a point.
+            let [b, c] = match case % 5 {
+                0 => [far, point()],
+                1 => [far, a + (far - a) * 0.4 + Vec3::new(1e-5, -2e-5, 1e-5)],
+                2 => [far, a + (far - a) * 0.3],
+                3 => [a, far],
+                _ => [a, a],
+            };
+            let found = squared_distance(p, a, b, c).sqrt();
+            let mut nearest = f32::INFINITY;
+            for i in 0..=200u8 {
+                for j in 0..=200 - i {
+                    let (u, v) = (f32::from(i) / 200.0, f32::from(j) / 200.0);
+                    nearest = nearest.min(p.distance(a + (b - a) * u + (c - a) * v));
+                }
+            }
+            assert!(found <= nearest + 1e-3, "case {case}: {found}, a point at {nearest}");
+            let spacing = (b - a).length().max((c - a).length()) / 200.0;
+            assert!(found >= nearest - spacing - 1e-3, "case {case}: {found} below {nearest}");
         }
     }
 
