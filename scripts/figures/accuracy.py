@@ -1,6 +1,5 @@
 """Measures run time against error; see scripts/accuracy."""
 
-import argparse
 import json
 import math
 import os
@@ -10,6 +9,7 @@ import subprocess
 
 from common import (
     ROOT,
+    Options,
     Programs,
     machine,
     real_data,
@@ -64,22 +64,11 @@ def main():
 
 
 def parse():
-    parser = argparse.ArgumentParser(prog="accuracy", description=__doc__)
-    parser.add_argument("--runs", type=int, default=1, help="the fastest of how many builds [1]")
-    parser.add_argument("--samples", type=int, default=300_000, help="points of a surface [300000]")
-    parser.add_argument("--no-real", action="store_true", help="generated meshes only")
-    parser.add_argument(
-        "--quick", action="store_true", help="a tenth of the size, three ways, nothing written"
-    )
-    parser.add_argument(
-        "--no-write", dest="write", action="store_false", help="print only, leave docs as they are"
-    )
-    arguments = parser.parse_args()
-    if arguments.runs < 1:
-        parser.error("--runs must be at least 1")
-    if arguments.quick:
-        arguments.write = False
-    return arguments
+    runs = ("the fastest of how many builds", 1)
+    quick = "a tenth of the size, three ways"
+    options = Options("accuracy", __doc__, quick, runs, real=True)
+    options.add_argument("--samples", type=int, default=300_000, help="points of a surface [300000]")
+    return options.parse()
 
 
 def paragraphs(parts):

@@ -1,6 +1,5 @@
 """Measures hlod-build; see scripts/bench-build."""
 
-import argparse
 import os
 import re
 import statistics
@@ -8,6 +7,7 @@ import subprocess
 
 from common import (
     ROOT,
+    Options,
     Programs,
     machine,
     quantity,
@@ -57,20 +57,11 @@ def paragraphs(parts):
 
 
 def parse():
-    parser = argparse.ArgumentParser(prog="bench-build", description=__doc__)
-    parser.add_argument("--runs", type=int, default=3, help="the median of how many runs [3]")
-    parser.add_argument(
-        "--quick", action="store_true", help="0.2 M triangles, one run, nothing written"
-    )
-    parser.add_argument("--no-real", action="store_true", help="generated cities only")
-    parser.add_argument(
-        "--no-write", dest="write", action="store_false", help="print only, leave docs as they are"
-    )
-    arguments = parser.parse_args()
-    if arguments.runs < 1:
-        parser.error("--runs must be at least 1")
+    quick = "0.2 M triangles, one run"
+    runs = ("the median of how many runs", 3)
+    arguments = Options("bench-build", __doc__, quick, runs, real=True).parse()
     if arguments.quick:
-        arguments.runs, arguments.write = 1, False
+        arguments.runs = 1
     return arguments
 
 

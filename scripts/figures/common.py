@@ -1,5 +1,6 @@
-"""What the scripts that measure share: building and running the programs, tables, the machine."""
+"""What the scripts that measure share: options, running the programs, tables, the machine."""
 
+import argparse
 import atexit
 import json
 import os
@@ -13,6 +14,38 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 DATA = Path(os.environ.get("HLOD_DATA", ROOT.parent / "shared" / "data"))
+
+
+class Options(argparse.ArgumentParser):
+    """The options of a script that writes its figures into the documents.
+
+    `quick` says what --quick does: None where the script has no such option, `runs` what --runs
+    counts and its default. With --quick nothing is written.
+    """
+
+    def __init__(self, prog, description, quick=None, runs=None, real=False):
+        super().__init__(prog=prog, description=description)
+        if runs:
+            what, default = runs
+            self.add_argument("--runs", type=int, default=default, help=f"{what} [{default}]")
+        if quick:
+            self.add_argument("--quick", action="store_true", help=f"{quick}, nothing written")
+        if real:
+            self.add_argument("--no-real", action="store_true", help="generated cities only")
+        self.add_argument(
+            "--no-write",
+            dest="write",
+            action="store_false",
+            help="print only, leave documents as they are",
+        )
+
+    def parse(self):
+        arguments = self.parse_args()
+        if getattr(arguments, "runs", 1) < 1:
+            self.error("--runs must be at least 1")
+        if getattr(arguments, "quick", False):
+            arguments.write = False
+        return arguments
 
 
 class Programs:

@@ -1,10 +1,10 @@
 """Compares ways of making coarse levels; see scripts/compare-borders."""
 
-import argparse
 import statistics
 
 from common import (
     ROOT,
+    Options,
     Programs,
     machine,
     quantity,
@@ -53,21 +53,8 @@ def main():
 
 
 def parse():
-    parser = argparse.ArgumentParser(prog="compare-borders", description=__doc__)
-    parser.add_argument("--runs", type=int, default=1, help="the fastest of how many runs [1]")
-    parser.add_argument(
-        "--quick", action="store_true", help="0.1 M triangles, nothing written"
-    )
-    parser.add_argument("--no-real", action="store_true", help="the generated city only")
-    parser.add_argument(
-        "--no-write", dest="write", action="store_false", help="print only, leave docs as they are"
-    )
-    arguments = parser.parse_args()
-    if arguments.runs < 1:
-        parser.error("--runs must be at least 1")
-    if arguments.quick:
-        arguments.write = False
-    return arguments
+    runs = ("the fastest of how many runs", 1)
+    return Options("compare-borders", __doc__, "0.1 M triangles", runs, real=True).parse()
 
 
 def fastest(programs, models, variant, runs):

@@ -1,11 +1,10 @@
 """Replays paths over cities and sets the figures beside the thesis's; see scripts/reproduce."""
 
-import argparse
 import json
 import os
 import subprocess
 
-from common import ROOT, Programs, machine, real_data, run, say, table, write_between_markers
+from common import ROOT, Options, Programs, machine, real_data, run, say, table, write_between_markers
 
 # The thesis's city has 25 blocks in its largest experiment; as many triangles as fit a small
 # machine and a run of minutes.
@@ -60,18 +59,12 @@ def main():
 
 
 def parse():
-    parser = argparse.ArgumentParser(prog="reproduce", description=__doc__)
-    parser.add_argument("--frames", type=int, default=900, help="frames of each path [900]")
-    parser.add_argument("--clock", choices=["wall", "model"], default="wall")
-    parser.add_argument(
-        "--quick", action="store_true", help="a small city, 60 frames, nothing written"
-    )
-    parser.add_argument(
-        "--no-write", dest="write", action="store_false", help="print only, leave docs as they are"
-    )
-    arguments = parser.parse_args()
+    options = Options("reproduce", __doc__, "a small city, 60 frames")
+    options.add_argument("--frames", type=int, default=900, help="frames of each path [900]")
+    options.add_argument("--clock", choices=["wall", "model"], default="wall")
+    arguments = options.parse()
     if arguments.quick:
-        arguments.frames, arguments.write = 60, False
+        arguments.frames = 60
     return arguments
 
 

@@ -1,27 +1,22 @@
 """Measures work that is skipped; see scripts/skipping."""
 
-import argparse
 import csv
 import json
 import resource
 import shutil
 import subprocess
 
-from common import ROOT, Programs, machine, run, say, table, write_between_markers
+from common import ROOT, Options, Programs, machine, run, say, table, write_between_markers
 
 TRIANGLES = 400_000
 BLOCKS = 16
 
 
 def main():
-    parser = argparse.ArgumentParser(prog="skipping", description=__doc__)
-    parser.add_argument("--runs", type=int, default=3, help="the fastest of how many runs [3]")
-    parser.add_argument(
-        "--no-write", dest="write", action="store_false", help="print only, leave README.md as it is"
-    )
-    arguments = parser.parse_args()
+    runs = ("the fastest of how many runs", 3)
+    arguments = Options("skipping", __doc__, runs=runs).parse()
     programs = Programs()
-    bench = Bench(programs, max(1, arguments.runs))
+    bench = Bench(programs, arguments.runs)
     rows = [row for part in (bench.builds, bench.inputs, bench.view) for row in part()]
     head = ["skipped", "where", "with it", "without it"]
     text = machine() + "\n\n" + table(head, rows)
