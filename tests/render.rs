@@ -2,12 +2,14 @@
 //! that they were skipped, or fail if `HLOD_REQUIRE_GPU` is 1.
 #![cfg(feature = "render")]
 
+#[path = "common/adapter.rs"]
+mod adapter;
+
 use std::io::Cursor;
 use std::path::Path;
 
 use glam::{DQuat, DVec3};
 use hlod::camera::Pose;
-use hlod::error::Error;
 use hlod::format::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 use hlod::mesh::{AlphaMode, Wrap};
 use hlod::render::content::{Content, Picture};
@@ -28,16 +30,7 @@ fn options() -> RenderOptions {
 const BACKGROUND: [u8; 3] = [10, 20, 30];
 
 fn renderer(options: &RenderOptions) -> Option<Renderer> {
-    match Renderer::new(options) {
-        Ok(renderer) => Some(renderer),
-        Err(Error::NoAdapter(what)) => {
-            let required = std::env::var("HLOD_REQUIRE_GPU").is_ok_and(|value| value == "1");
-            assert!(!required, "a graphics adapter is required: {what}");
-            println!("skipped: {what}");
-            None
-        }
-        Err(error) => panic!("{error}"),
-    }
+    adapter::or_skip(Renderer::new(options))
 }
 
 /// At the origin, looking along −z; the picture is two metres wide at one metre.

@@ -8,6 +8,9 @@
 #[path = "../e2e/support/mod.rs"]
 mod support;
 
+#[cfg(feature = "render")]
+#[path = "../common/adapter.rs"]
+mod adapter;
 mod bench_support;
 
 mod cli;

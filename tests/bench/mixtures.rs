@@ -7,11 +7,11 @@ use glam::DVec3;
 use hlod::bench::{Accuracy, Reference, Session, Sighting, Witness};
 use hlod::camera::{Ground, PathKind, Pose, View, from_angles, make_path};
 use hlod::city::{CityOptions, TextureSize};
-use hlod::error::Error;
 use hlod::mesh::UpAxis;
 use hlod::render::RenderOptions;
 use hlod::runtime::SceneTree;
 
+use crate::adapter::or_skip;
 use crate::bench_support::build_options;
 use crate::support::build_with;
 use crate::support::inputs::write_city;
@@ -36,16 +36,7 @@ fn closed_city(folder: &Path) -> Session {
 /// `None` where there is no adapter and none is required.
 fn reference(session: &Session) -> Option<Reference> {
     let options = RenderOptions { size: SIZE, ..RenderOptions::default() };
-    match Reference::new(session, &options, 1) {
-        Ok(reference) => Some(reference),
-        Err(Error::NoAdapter(what)) => {
-            let required = std::env::var("HLOD_REQUIRE_GPU").is_ok_and(|value| value == "1");
-            assert!(!required, "a graphics adapter is required: {what}");
-            println!("skipped: {what}");
-            None
-        }
-        Err(error) => panic!("{error}"),
-    }
+    or_skip(Reference::new(session, &options, 1))
 }
 
 /// From streets and from above, near and far.
