@@ -113,6 +113,18 @@ fn bad_usage_is_refused_with_the_range() {
     }
 }
 
+/// Before the first of its runs.
+#[test]
+fn a_sweep_with_a_target_that_is_none_is_refused() {
+    let place = Place::new(city());
+    let sweep = ["sweep", "out", "fly.csv", "--clock", "model", "--targets"];
+    for (targets, part) in [("5,-1", "-1"), ("5,0", "0"), ("5,NaN", "NaN"), ("5,inf", "inf")] {
+        refused(&place, &[&sweep[..], &[targets]].concat(), USAGE, &["--targets", "above 0", part]);
+    }
+    let both = ["--target-ms", "3"];
+    refused(&place, &[&sweep[..], &["5"], &both].concat(), USAGE, &["--target-ms", "--targets"]);
+}
+
 #[test]
 fn a_cap_below_the_roots_says_what_they_need() {
     let place = Place::new(city());

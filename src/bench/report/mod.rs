@@ -34,34 +34,40 @@ pub fn report_html(run: &Run, context: &Context, summary: &Value) -> Result<Stri
         "" => context.scene_name.clone(),
         path => format!("{} along {path}", context.scene_name),
     };
+    let body = html! {
+        h1 { (title) }
+        (facts(run, context, summary))
+        (broken(context))
+        h2 { "Figures of this run and the thesis's" }
+        p {
+            "The thesis is A. Lakhia, Interactive Rendering for Large City Models (Berkeley, \
+             2004), with its section at each heading. Its figures are from another city, \
+             another machine and paths of its own."
+        }
+        (summary_tables(summary))
+        @for section in &sections { (section) }
+        @if let Some(reference) = &context.reference { (accuracy::worst(reference)) }
+        h2 { "Options" }
+        (options(context, summary))
+    };
+    Ok(page(&format!("{title} – hlod-bench"), &body))
+}
+
+/// A whole page that needs nothing beside itself.
+fn page(title: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) " – hlod-bench" }
+                title { (title) }
                 style { (PreEscaped(STYLE)) }
             }
-            body {
-                h1 { (title) }
-                (facts(run, context, summary))
-                (broken(context))
-                h2 { "Figures of this run and the thesis's" }
-                p {
-                    "The thesis is A. Lakhia, Interactive Rendering for Large City Models (Berkeley, \
-                     2004), with its section at each heading. Its figures are from another city, \
-                     another machine and paths of its own."
-                }
-                (summary_tables(summary))
-                @for section in &sections { (section) }
-                @if let Some(reference) = &context.reference { (accuracy::worst(reference)) }
-                h2 { "Options" }
-                (options(context, summary))
-            }
+            body { (body) }
         }
     };
-    Ok(page.into_string())
+    page.into_string()
 }
 
 fn facts(run: &Run, context: &Context, summary: &Value) -> Markup {

@@ -1,9 +1,9 @@
 //! A sweep over targets as a page: the curve of image error against frame time, and its figures.
 
-use maud::{DOCTYPE, PreEscaped, html};
+use maud::html;
 
 use super::plot::{Axis, BLUE, Layer, ORANGE, Plot, Shape, VERMILLION};
-use super::{STYLE, figure_html};
+use super::{figure_html, page};
 use crate::Result;
 use crate::bench::Sweep;
 use crate::bench::report::figures::{Figure, axis};
@@ -13,26 +13,15 @@ pub fn sweep_html(sweep: &Sweep, title: &str) -> Result<String> {
     let table = sweep.table();
     let (heads, lines) = table.split_first().map_or((&[][..], &[][..]), |(a, b)| (&a[..], b));
     let figure = figure_html(&curve(sweep))?;
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (title) " – hlod-bench sweep" }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                h1 { (title) }
-                div .figures { (figure) }
-                table .sweep {
-                    thead { tr { @for head in heads { th { (head) } } } }
-                    tbody { @for line in lines { tr { @for field in line { td { (field) } } } } }
-                }
-            }
+    let body = html! {
+        h1 { (title) }
+        div .figures { (figure) }
+        table .sweep {
+            thead { tr { @for head in heads { th { (head) } } } }
+            tbody { @for line in lines { tr { @for field in line { td { (field) } } } } }
         }
     };
-    Ok(page.into_string())
+    Ok(page(&format!("{title} – hlod-bench sweep"), &body))
 }
 
 fn curve(sweep: &Sweep) -> Figure {

@@ -182,6 +182,9 @@ fn sweep(targets: &[f64], arguments: &RunArgs) -> Result<()> {
     if arguments.target_ms.is_some() {
         return Err(Error::Usage("--target-ms: a sweep has --targets".into()));
     }
+    if let Some(target) = targets.iter().find(|&&target| !(target > 0.0 && target.is_finite())) {
+        return Err(Error::Usage(format!("--targets: {target}, expected milliseconds above 0")));
+    }
     let mut sweep = Sweep::default();
     let mut first_unusable = None;
     for &target in targets {
@@ -218,7 +221,8 @@ fn replay_once(arguments: &RunArgs) -> Result<(serde_json::Value, Option<Error>)
     options.check()?;
     check_output(&arguments.out)?;
     let bar = Bar::new(arguments.quiet, path.frames.len());
-    let (run, mut context) = run(arguments, &session, &path, options, constants, &bar)?;
+    let job = Job { arguments, session: &session, path: &path, options, constants, bar: &bar };
+    let (run, mut context) = run(job)?;
     bar.bar.finish_and_clear();
     context.path_name = path_name;
     let summary = summary(&run, &context);
@@ -238,15 +242,19 @@ fn replay_once(arguments: &RunArgs) -> Result<(serde_json::Value, Option<Error>)
     Ok((summary, unusable))
 }
 
-#[cfg(feature = "render")]
-fn run(
-    arguments: &RunArgs,
-    session: &Session,
-    path: &CameraPath,
+/// What a run needs.
+struct Job<'a> {
+    arguments: &'a RunArgs,
+    session: &'a Session,
+    path: &'a CameraPath,
     options: BenchOptions,
     constants: Option<ClockConstants>,
-    bar: &Bar,
-) -> Result<(Run, Context)> {
+    bar: &'a Bar,
+}
+
+#[cfg(feature = "render")]
+fn run(job: Job) -> Result<(Run, Context)> {
+    let Job { arguments, session, path, options, constants, bar } = job;
     use hlod::bench::{Reference, Snapshots, Witness};
     use hlod::render::{RenderOptions, Renderer, Shading};
     use run_args::ShadingArg;
@@ -318,14 +326,8 @@ fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Res
 }
 
 #[cfg(not(feature = "render"))]
-fn run(
-    arguments: &RunArgs,
-    session: &Session,
-    path: &CameraPath,
-    options: BenchOptions,
-    constants: Option<ClockConstants>,
-    bar: &Bar,
-) -> Result<(Run, Context)> {
+fn run(job: Job) -> Result<(Run, Context)> {
+    let Job { arguments, session, path, options, constants, bar } = job;
     if arguments.clock == Clock::Wall || arguments.reference_every.is_some() {
         return Err(cannot_draw());
     }
