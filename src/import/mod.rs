@@ -31,7 +31,9 @@ pub use find::find_inputs;
 pub use picture::{Picture, decode_texture, texture_size};
 pub use spent::Spent;
 
-use crate::mesh::Model;
+use glam::DVec3;
+
+use crate::mesh::{Model, Part};
 use crate::{Error, Result};
 
 /// Reads one model file: OBJ, glTF or GLB, by its extension.
@@ -76,6 +78,10 @@ fn assemble(mut model: Model) -> Result<Model> {
         let what = format!("no triangle is left: {}", reasons.join("; "));
         return Err(Error::input(model.source, what));
     }
+    if !model.parts.iter().any(spans_area) {
+        let what = "no triangle is left: all are lines, of no area; expected a surface";
+        return Err(Error::input(model.source, what));
+    }
     model.dependencies.sort();
     model.dependencies.dedup();
     let mut names = BTreeSet::new();
@@ -90,6 +96,18 @@ fn assemble(mut model: Model) -> Result<Model> {
         material.name = name;
     }
     Ok(model)
+}
+
+/// True where some triangle is higher than its corners' last bits. Looks no further than that.
+fn spans_area(part: &Part) -> bool {
+    part.indices.as_chunks::<3>().0.iter().any(|corners| {
+        let [a, b, c] = corners.map(|vertex| DVec3::from(part.positions[vertex as usize]));
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        let magnitude = [a, b, c].map(|corner| corner.abs().max_element()).into_iter();
+        let rounding = 4.0 * f64::EPSILON * magnitude.fold(0.0, f64::max);
+        // Height of the triangle on its longest side; false where that is beyond f64.
+        (b - a).cross(c - a).length() > rounding * longest
+    })
 }
 
 #[cfg(test)]

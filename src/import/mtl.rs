@@ -23,10 +23,26 @@ pub(super) struct MtlMaterial {
     pub(super) transform: UvTransform,
 }
 
+/// From here on f32 has less than 2^-16 of a repeat.
+const FAR_OUT: f64 = 256.0;
+
 impl MtlMaterial {
     /// Grey, without a picture.
     pub(super) fn plain(name: &str) -> Self {
         Self { material: Material::plain(name), transform: UvTransform::default() }
+    }
+
+    /// How many whole repeats of a picture lie before a texture coordinate that is so far out that
+    /// f32 would lose part of it: the picture is the same without them. Even, so that one that is
+    /// mirrored is too.
+    pub(super) fn whole_repeats(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let exact = |axis: usize, at: f64| {
+            let at = at * self.transform.scale[axis] + self.transform.offset[axis];
+            let at = if axis == 1 { 1.0 - at } else { at };
+            let far = at.abs() > FAR_OUT && self.material.wrap[axis] != Wrap::Clamp;
+            if far { 2.0 * (at / 2.0).round() } else { 0.0 }
+        };
+        [exact(0, u), exact(1, v)]
     }
 }
 
@@ -44,11 +60,11 @@ impl Default for UvTransform {
 }
 
 impl UvTransform {
-    /// The texture coordinate, v downwards.
-    pub(super) fn apply(&self, [u, v]: [f64; 2]) -> [f32; 2] {
+    /// The texture coordinate, v downwards, `back` repeats of the picture further back.
+    pub(super) fn apply(&self, [u, v]: [f64; 2], back: [f64; 2]) -> [f32; 2] {
         let u = u * self.scale[0] + self.offset[0];
         let v = v * self.scale[1] + self.offset[1];
-        [u as f32, (1.0 - v) as f32]
+        [(u - back[0]) as f32, (1.0 - v - back[1]) as f32]
     }
 }
 
@@ -287,8 +303,8 @@ mod tests {
     #[test]
     fn the_transform_comes_before_the_flip() {
         let transform = UvTransform { scale: [2.0, 4.0], offset: [0.5, 0.25] };
-        assert_eq!(transform.apply([1.0, 0.125]), [2.5, 0.25]);
-        assert_eq!(UvTransform::default().apply([0.25, 0.25]), [0.25, 0.75]);
+        assert_eq!(transform.apply([1.0, 0.125], [0.0; 2]), [2.5, 0.25]);
+        assert_eq!(UvTransform::default().apply([0.25, 0.25], [0.0; 2]), [0.25, 0.75]);
     }
 
     #[test]

@@ -129,6 +129,8 @@ struct PartState {
     part: Part,
     /// Faces without texture coordinates.
     bare_faces: u64,
+    /// Whole repeats that texture coordinates are moved back by; `None` before the first.
+    repeats: Option<[f64; 2]>,
 }
 
 /// A material that a `usemtl` named.
@@ -293,7 +295,7 @@ impl<'a> Obj<'a> {
         let mut vertices = Vec::with_capacity(chunk.vertices.len());
         for pair in chunk.vertices {
             let vertex = self.unifier.vertex(pair, || {
-                let part = &mut self.parts[pair.part as usize].part;
+                let PartState { part, repeats, .. } = &mut self.parts[pair.part as usize];
                 let used = &self.materials[part.material as usize];
                 part.positions.push(self.positions[pair.position as usize]);
                 if let Some(color) = self.colors.get(pair.position as usize) {
@@ -301,7 +303,13 @@ impl<'a> Obj<'a> {
                 }
                 if used.material.material.texture.is_some() || !used.defined {
                     let given = self.texcoords.get(pair.texcoord as usize);
-                    let texcoord = given.map_or([0.0; 2], |uv| used.material.transform.apply(*uv));
+                    let texcoord = given.map_or([0.0; 2], |uv| {
+                        let back = repeats.get_or_insert_with(|| match used.defined {
+                            true => used.material.whole_repeats(*uv),
+                            false => [0.0; 2], // it may be clamped for all that is known
+                        });
+                        used.material.transform.apply(*uv, *back)
+                    });
                     part.texcoords.push(texcoord);
                 }
                 part.positions.len() as u32 - 1
@@ -382,7 +390,7 @@ impl<'a> Obj<'a> {
         let parts = &mut self.parts;
         let part = *self.part_of.entry((group, material)).or_insert_with(|| {
             let part = Part { group, material, ..Part::default() };
-            parts.push(PartState { part, bare_faces: 0 });
+            parts.push(PartState { part, bare_faces: 0, repeats: None });
             parts.len() as u32 - 1
         });
         self.part = Some(part);
@@ -450,7 +458,7 @@ impl<'a> Obj<'a> {
                 } else if used.transform != UvTransform::default() {
                     for texcoord in &mut state.part.texcoords {
                         let [u, v] = texcoord.map(f64::from);
-                        *texcoord = used.transform.apply([u, 1.0 - v]);
+                        *texcoord = used.transform.apply([u, 1.0 - v], [0.0; 2]);
                     }
                 }
             }
@@ -508,7 +516,7 @@ impl<'a> Obj<'a> {
 }
 
 /// A part as it will stay, and what was left out. `white` is true where no vertex has a colour.
-fn finished(PartState { mut part, bare_faces }: PartState, white: bool) -> (Part, Tally) {
+fn finished(PartState { mut part, bare_faces, .. }: PartState, white: bool) -> (Part, Tally) {
     let mut tally = Tally { untextured_faces: bare_faces, ..Tally::default() };
     // A part may have begun before the first coloured vertex of the file.
     if white {

@@ -128,6 +128,51 @@ fn texture_coordinates_are_transformed_then_flipped() {
 }
 
 #[test]
+fn what_has_no_area_at_all_is_refused() {
+    let row = |scale: [f64; 3], at: f64| {
+        let corner = |n: usize| scale.map(|c| at + c * n as f64);
+        let vertex = |n| corner(n).map(|c| c.to_string()).join(" ");
+        format!("v {}\nv {}\nv {}\nf 1 2 3\n", vertex(0), vertex(1), vertex(3))
+    };
+    for at in [0.0, 678_016.123] {
+        for along in [[1.0, 0.0, 0.0], [0.3, 0.7, 0.2]] {
+            let error = read(row(along, at), &[]).unwrap_err().to_string();
+            assert!(error.contains("no triangle is left"), "{error}");
+        }
+    }
+    // A needle of 1 m and 1 nm is none.
+    assert!(read("v 0 0 0\nv 1 0 0\nv 0 1e-9 0\nf 1 2 3\n", &[]).is_ok());
+}
+
+#[test]
+fn texture_coordinates_far_out_keep_their_digits_where_the_picture_repeats() {
+    let read = |clamp: &str, at: f64| {
+        let vt = |u: f64, v: f64| format!("vt {} {}\n", at + u, v - at);
+        let obj = format!(
+            "mtllib a.mtl\n{SQUARE}{}{}{}usemtl t\nf 1/1 2/2 3/3\n",
+            vt(0.125, 0.5),
+            vt(1.0625, 0.5),
+            vt(1.0625, 0.75),
+        );
+        let mtl = format!("newmtl t\nmap_Kd {clamp} t.png\n");
+        let model = read(obj, &[("a.mtl", mtl.as_str()), ("t.png", "")]).unwrap();
+        model.parts[0].texcoords.clone()
+    };
+    let near = [[0.125, 0.5], [1.0625, 0.5], [1.0625, 0.25]];
+    assert_eq!(read("", 0.0), near);
+    for far in [1e6, -1e6, 3e9] {
+        let found = read("", far);
+        let [u, v] = [0, 1].map(|axis| (found[0][axis] - near[0][axis]) % 2.0);
+        assert_eq!([u, v], [0.0; 2], "the same place of an even repeat");
+        let moved: Vec<[f32; 2]> =
+            near.iter().map(|uv| [0, 1].map(|i| uv[i] + found[0][i] - near[0][i])).collect();
+        assert_eq!(found, moved);
+    }
+    assert_eq!(read("", 100.0)[0], [100.125, 100.5], "what is near stays as it is");
+    assert_eq!(read("-clamp on", 1e6)[0], [1_000_000.1, 1_000_000.5]);
+}
+
+#[test]
 fn a_position_with_two_texture_coordinates_is_two_vertices_only_where_textured() {
     let obj = |material: &str| {
         format!(
