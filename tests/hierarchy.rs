@@ -8,7 +8,7 @@ use common::*;
 use hlod::build::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom, simplifications};
 use hlod::build::simplify::{BUDGET_TOLERANCE, LadderStep, Simplifier};
 use hlod::build::skirt::triangles_of;
-use hlod::mesh::key;
+use hlod::mesh::{Mesh, key};
 
 fn every_option() -> Vec<HierarchyOptions> {
     let mut all = Vec::new();
@@ -245,5 +245,40 @@ fn border_figures() {
                 errors[errors.len() / 2] * 1e3,
             );
         }
+    }
+}
+
+/// A sheet of 64 by 64 quads of 1 m whose inner columns are moved by `by`.
+fn columns_moved(by: f64) -> Mesh<f64> {
+    let mut mesh = Mesh::<f64>::default();
+    for row in 0..=64 {
+        for column in 0..=64 {
+            let x = f64::from(column) + if (1..64).contains(&column) { by } else { 0.0 };
+            let [a, b] = [f64::from(column), f64::from(row)].map(|at| (at * 0.37).sin());
+            mesh.positions.push([x, f64::from(row), a * b]);
+            mesh.materials.push(0);
+        }
+    }
+    for row in 0..64 {
+        for column in 0..64 {
+            let at = row * 65 + column;
+            mesh.triangles.extend([[at, at + 1, at + 66], [at, at + 66, at + 65]]);
+        }
+    }
+    mesh
+}
+
+#[test]
+fn rows_of_vertices_a_step_beside_a_plane_thin_as_those_on_it() {
+    let options = HierarchyOptions { desired_tris: 150, ..Default::default() };
+    let locked = |by: f64| -> usize {
+        let (piece, lattice) = block(columns_moved(by * 2f64.powi(-17)));
+        assert_eq!(lattice.step, 2f64.powi(-17));
+        build(piece, lattice, &options).iter().map(|node| node.locked).sum()
+    };
+    let on = locked(0.0);
+    for by in [1.0, -1.0, 3.0, -3.0] {
+        let beside = locked(by);
+        assert!(beside * 20 <= on * 21, "{beside} locked {by} steps beside, {on} on the planes");
     }
 }

@@ -268,7 +268,8 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let planes: Vec<f32> = (1..slabs)
             .map(|i| {
                 let share = f64::from(i) / f64::from(slabs);
-                self.lattice.round(f64::from(low[axis]) + side(axis) * share) as f32
+                let even = self.lattice.round(f64::from(low[axis]) + side(axis) * share);
+                self.through_vertices(&piece.mesh, axis, even as f32)
             })
             .collect();
         let shares: Vec<f64> = self.factors[level + 1..]
@@ -296,6 +297,25 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let mut pieces = Vec::with_capacity(slabs as usize);
         self.bisect(piece, axis, &planes, &rule, &mut pieces);
         pieces
+    }
+
+    /// The coordinate of a plane, moved to that of the most vertices that are so near it that they
+    /// count as on it ([`CutTolerance::sliver_steps`]), of several the nearest. Vertices beside
+    /// their plane stay at every level; rows of a grid are often beside it by a step.
+    fn through_vertices(&self, mesh: &Mesh, axis: usize, even: f32) -> f32 {
+        let step = self.lattice.step as f32;
+        let most = self.options.tolerance.sliver_steps as i32;
+        let reach = most as f32 * step;
+        let mut counts = vec![0u32; 2 * most as usize + 1];
+        for position in &mesh.positions {
+            // Multiples of the step, all of them: differences and quotients are exact.
+            let beside = position[axis] - even;
+            if beside.abs() <= reach {
+                counts[((beside / step) as i32 + most) as usize] += 1;
+            }
+        }
+        let best = (-most..=most).max_by_key(|&at| (counts[(at + most) as usize], -at.abs(), at));
+        even + best.unwrap_or(0) as f32 * step
     }
 
     /// Cuts at the middle plane, then each half at its own.
