@@ -16,6 +16,8 @@ use crate::format::Scene;
 
 /// Fewer samples of a leaf than this say nothing of it.
 const FEWEST: u64 = 12;
+/// Likewise for tiles: JPEG spoils a few texels of a tile together, which several samples may meet.
+const FEWEST_TILES: u64 = 40;
 
 /// What the source shows at each point.
 pub(super) struct Reference {
@@ -179,7 +181,7 @@ pub(super) fn leaf_tiles(
         }
         let (_, _, tiles) = found;
         all.extend(&tiles);
-        if tiles.clear >= FEWEST {
+        if tiles.clear >= FEWEST_TILES {
             demand(&scene.nodes[leaf as usize].file, &tiles, limits.leaf_wrong_tiles);
         }
     }

@@ -59,12 +59,13 @@ pub(super) fn errors(
         median_ratio: at(0.5),
         high_ratio: at(0.95),
     };
-    if figures.median_ratio > limits.error_ratio {
+    let limit = limits.error_ratio * adding_up(scene);
+    if figures.median_ratio > limit {
         check.fail(
             "all nodes",
             format!(
-                "stored errors are {:.2} times the measured ones in the median, limit {}",
-                figures.median_ratio, limits.error_ratio
+                "stored errors are {:.2} times the measured ones in the median, limit {limit}",
+                figures.median_ratio
             ),
             "detail is loaded that nobody needs; report this: the builder's bound is too loose",
         );
@@ -74,4 +75,13 @@ pub(super) fn errors(
         figures.nodes, figures.least_ratio, figures.median_ratio, figures.high_ratio, count
     );
     (Some(figures), check)
+}
+
+/// Bounds add up from level to level, each about as many times that of the level below as the
+/// level factor says: with 2 the sum is 2 of the last one's own, with 4 it is 4/3, with more less.
+/// Returns it as a multiple of that with 4, which the limit is for; never below 1.
+fn adding_up(scene: &Scene) -> f64 {
+    let factor = scene.parameters["level_factor"].as_u64().unwrap_or(4).clamp(2, 64) as f64;
+    let sum = |factor: f64| factor / (factor - 1.0);
+    (sum(factor) / sum(4.0)).max(1.0)
 }

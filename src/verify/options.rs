@@ -46,9 +46,10 @@ pub struct Limits {
     /// Relative difference between a stored attribute and its recomputation: room for the last
     /// bits of sums.
     pub attribute: f64,
-    /// Relative difference of the area of leaves and source.
+    /// Relative difference of the area of leaves and source, beside what rounding may change.
     pub area: f64,
-    /// Stored error over measured error, at most this in the median of the nodes.
+    /// Stored error over measured error, at most this in the median of the nodes; with a level
+    /// factor below 4 more, since bounds add up over more levels.
     pub error_ratio: f64,
     /// Colour error of the leaves (RMS, 0–255) over that of JPEG itself on the source's pictures.
     pub texel_ratio: f64,

@@ -203,7 +203,8 @@ fn size_failure(bytes: &[u8], size: [u32; 2]) -> Option<String> {
 /// Nodes that stick out of their parent's box, and errors that grow towards the leaves.
 fn tree_failures(scene: &Scene) -> Vec<Failure> {
     let mut failures = Vec::new();
-    for node in &scene.nodes {
+    let steps = super::step::steps(scene);
+    for (node, step) in scene.nodes.iter().zip(steps) {
         let Some(parent) = node.parent.map(|parent| &scene.nodes[parent as usize]) else {
             continue;
         };
@@ -220,7 +221,8 @@ fn tree_failures(scene: &Scene) -> Vec<Failure> {
                     .max(node.bbox_max[axis] - parent.bbox_max[axis])
             })
             .fold(0.0, f64::max);
-        if beyond > parent.geometric_error {
+        // Corners of leaves lie on the lattice, those of coarse nodes between its points.
+        if beyond > parent.geometric_error + step {
             fail(format!(
                 "reaches {beyond:.4} m out of its parent's box, whose error is {:.4} m",
                 parent.geometric_error
