@@ -13,7 +13,7 @@ use crate::support::Random;
 use crate::support::inputs::{small_city, write_city};
 use crate::support::result::{Built, contents, difference, lasting};
 
-const KILLS: usize = 24;
+const KILLS: usize = 40;
 
 /// A result that reads well: the scene by its own checksum, each node by the scene's.
 fn check_whole(out: &Path) {
