@@ -15,10 +15,12 @@ pub mod import;
 pub mod loading;
 pub mod mesh;
 pub mod picture_error;
+pub mod place;
 pub mod render;
 pub mod report;
 pub mod runtime;
 pub mod texture;
+pub mod tileset;
 pub mod verify;
 
 mod random;

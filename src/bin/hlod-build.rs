@@ -15,6 +15,7 @@ use hlod::build::simplify::Simplifier;
 use hlod::build::{BuildOptions, Outcome, build};
 use hlod::format::Scene;
 use hlod::mesh::UpAxis;
+use hlod::place::Placement;
 use hlod::report::{build_summary, inspect};
 use hlod::verify::{self, VerifyOptions, verify};
 use hlod::{Error, Result};
@@ -27,7 +28,8 @@ const NOT_HELD: u8 = 3;
 ///
 /// Reads OBJ, glTF and GLB files, or folders of them; divides them into blocks; and writes for
 /// every block a tree of nodes, coarse and whole at the root, original and in pieces at the
-/// leaves, as OUT/scene.hlod, OUT/nodes/*.glb and OUT/build.json. What stood in OUT before stays
+/// leaves, as OUT/scene.hlod, OUT/nodes/*.glb and OUT/build.json, and as OUT/tileset.json for viewers
+/// of 3D Tiles. What stood in OUT before stays
 /// until the new result is complete. Where inputs and options have not changed, nothing is done.
 #[derive(Parser, Debug)]
 #[command(
@@ -127,12 +129,36 @@ struct BuildArgs {
     #[arg(long, value_enum, help_heading = "Hierarchy")]
     up: Option<UpArg>,
 
+    /// The coordinate reference system of the coordinates, as EPSG:CODE: projected, in metres or
+    /// feet. Puts tileset.json on the globe
+    #[arg(long, value_name = "EPSG:CODE", conflicts_with = "origin", help_heading = "Place")]
+    crs: Option<CrsArg>,
+    /// Metres to add to the heights of --crs to make them heights over the ellipsoid: the height
+    /// of the geoid where they are over sea level
+    #[arg(
+        long,
+        value_name = "METRES",
+        default_value_t = 0.0,
+        requires = "crs",
+        allow_negative_numbers = true,
+        help_heading = "Place"
+    )]
+    height_offset: f64,
+    /// Longitude and latitude in degrees and height over the ellipsoid of the coordinates' origin,
+    /// where these are metres east, north and up
+    #[arg(long, value_name = "LON,LAT,HEIGHT", allow_hyphen_values = true, help_heading = "Place")]
+    origin: Option<OriginArg>,
+
     /// Quality of JPEG textures, 1-100. From 90 on, colour keeps its full resolution
     #[arg(long, value_name = "Q", default_value_t = 85, help_heading = "Textures")]
     jpeg_quality: u8,
     /// Longest side of a node's atlas in texels, 16-65535
     #[arg(long, value_name = "TEXELS", default_value_t = 4096, help_heading = "Textures")]
     max_atlas: u32,
+
+    /// Compress vertices and indices without loss: `meshopt` is EXT_meshopt_compression
+    #[arg(long, value_enum, default_value_t = CompressArg::None, help_heading = "Files")]
+    compress: CompressArg,
 
     /// Threads, 0-1024; 0 is one for each core. The result does not depend on it
     #[arg(long, short = 'j', value_name = "N", default_value_t = 0, help_heading = "Running")]
@@ -143,6 +169,12 @@ struct BuildArgs {
     /// Print nothing but errors
     #[arg(long, short, help_heading = "Running")]
     quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum CompressArg {
+    None,
+    Meshopt,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -198,11 +230,54 @@ impl BuildArgs {
                 UpArg::Y => UpAxis::Y,
                 UpArg::Z => UpAxis::Z,
             }),
+            placement: self.placement(),
             jpeg_quality: self.jpeg_quality,
             max_atlas: self.max_atlas,
+            compress: self.compress == CompressArg::Meshopt,
             force: self.force,
             ..Default::default()
         }
+    }
+}
+
+impl BuildArgs {
+    fn placement(&self) -> Placement {
+        match (self.crs, self.origin) {
+            (Some(CrsArg(epsg)), _) => Placement::Crs { epsg, height_offset: self.height_offset },
+            (None, Some(OriginArg([lon, lat, height]))) => Placement::Origin { lon, lat, height },
+            (None, None) => Placement::Local,
+        }
+    }
+}
+
+/// `EPSG:25832`.
+#[derive(Clone, Copy, Debug)]
+struct CrsArg(u32);
+
+impl std::str::FromStr for CrsArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let code = text.get(..5).filter(|start| start.eq_ignore_ascii_case("EPSG:"));
+        code.and_then(|_| text[5..].parse().ok())
+            .map(Self)
+            .ok_or_else(|| format!("expected EPSG:CODE, such as EPSG:25832, found {text}"))
+    }
+}
+
+/// `11.42,48.77,370`.
+#[derive(Clone, Copy, Debug)]
+struct OriginArg([f64; 3]);
+
+impl std::str::FromStr for OriginArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Option<Vec<f64>> =
+            text.split(',').map(|number| number.trim().parse().ok()).collect();
+        numbers.and_then(|numbers| numbers.try_into().ok()).map(Self).ok_or_else(|| {
+            format!("expected LON,LAT,HEIGHT, such as 11.42,48.77,370, found {text}")
+        })
     }
 }
 

@@ -18,7 +18,7 @@ use super::shared_borders::{keep_shared, shared_positions};
 use super::stages::{Stage, Stages};
 use super::stray::set_strays_aside;
 use crate::Result;
-use crate::format::{BlockInfo, OutputDir};
+use crate::format::{BlockInfo, Encoding, OutputDir};
 use crate::mesh::{Material, Model, Part, UpAxis, Warnings};
 use crate::texture::{
     BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan, texture_factors,
@@ -168,6 +168,7 @@ pub fn build_input(
             prefix: format!("{prefix}-{number:04}"),
             origin,
             up,
+            encoding: Encoding { compress: options.compress },
             textured_weight: options.textured_weight,
             stages,
             progress,

@@ -6,7 +6,9 @@ use super::progress::Progress;
 use super::simplify::{BUDGET_TOLERANCE, LadderStep};
 use super::skirt;
 use super::stages::{Stage, Stages};
-use crate::format::{NODES_DIR, NodeImageData, NodeLabel, OutputDir, file_crc, write_glb};
+use crate::format::{
+    Encoding, NODES_DIR, NodeImageData, NodeLabel, OutputDir, file_crc, write_glb_encoded,
+};
 use crate::mesh::{Mesh, UpAxis, Warnings};
 use crate::texture::{BlockTextures, TexturedNode};
 use crate::{Error, Result};
@@ -61,6 +63,8 @@ pub struct DiskSink<'a> {
     pub origin: [f64; 3],
     /// For glTF's axes.
     pub up: UpAxis,
+    /// How geometry is stored.
+    pub encoding: Encoding,
     /// `c_textured`.
     pub textured_weight: f64,
     /// Where the time goes.
@@ -88,10 +92,11 @@ impl NodeSink for DiskSink<'_> {
         };
         let id = node_id(&file);
         let textured = self.stages.time(Stage::Atlas, || self.textured(node))?;
-        let TexturedNode { mesh, warnings, .. } = textured;
+        let TexturedNode { mut mesh, warnings, .. } = textured;
         self.stages.time(Stage::Write, || {
             let label = NodeLabel { id, level: node.level as u32 };
-            let bytes = write_glb(&mesh, self.up, label)?;
+            self.encoding.prepare(&mut mesh);
+            let bytes = write_glb_encoded(&mesh, self.up, label, self.encoding)?;
             self.out.write(format!("{NODES_DIR}/{file}"), &bytes)?;
             let attributes = attributes(&mesh, self.textured_weight);
             let pictures = mesh

@@ -3,6 +3,7 @@
 use super::blocks::BlockMode;
 use super::hierarchy::HierarchyOptions;
 use crate::mesh::UpAxis;
+use crate::place::Placement;
 use crate::report::shortest;
 use crate::{Error, Result};
 
@@ -15,10 +16,14 @@ pub struct BuildOptions {
     pub blocks: BlockMode,
     /// The axis that points at the sky; `None` takes the format's word, or looks at the geometry.
     pub up: Option<UpAxis>,
+    /// Where the city stands on the Earth.
+    pub placement: Placement,
     /// JPEG quality, 1–100.
     pub jpeg_quality: u8,
     /// Longest side of an atlas in texels, 16–65535.
     pub max_atlas: u32,
+    /// Compress vertices and indices without loss.
+    pub compress: bool,
     /// Weight of textured triangles in the cost (`c_textured`), 0–1.
     pub textured_weight: f64,
     /// Build even where nothing has changed.
@@ -31,8 +36,10 @@ impl Default for BuildOptions {
             hierarchy: HierarchyOptions::default(),
             blocks: BlockMode::Auto,
             up: None,
+            placement: Placement::Local,
             jpeg_quality: 85,
             max_atlas: 4096,
+            compress: false,
             textured_weight: super::attributes::TEXTURED_WEIGHT,
             force: false,
         }
@@ -60,7 +67,7 @@ impl BuildOptions {
     /// The parameters that the result depends on, for `scene.hlod` and `build.json`.
     pub fn to_json(&self) -> serde_json::Value {
         let hierarchy = &self.hierarchy;
-        serde_json::json!({
+        let mut parameters = serde_json::json!({
             "blocks": self.blocks.to_string(),
             "desired_tris": hierarchy.desired_tris,
             "level_factor": hierarchy.level_factor,
@@ -73,6 +80,37 @@ impl BuildOptions {
             "jpeg_quality": self.jpeg_quality,
             "max_atlas": self.max_atlas,
             "textured_weight": self.textured_weight,
-        })
+        });
+        if self.compress {
+            parameters["compress"] = "meshopt".into();
+        }
+        if self.placement != Placement::Local {
+            parameters[PLACEMENT] = serde_json::json!(self.placement);
+        }
+        parameters
     }
+}
+
+/// The parameter that says where the city stands; the nodes do not depend on it.
+const PLACEMENT: &str = "placement";
+
+/// Where a scene's parameters say that it stands.
+pub fn placement_of(parameters: &serde_json::Value) -> Result<Placement> {
+    match parameters.get(PLACEMENT) {
+        None => Ok(Placement::Local),
+        Some(placement) => serde_json::from_value(placement.clone())
+            .map_err(|error| Error::Usage(format!("the scene's placement: {error}"))),
+    }
+}
+
+/// True where nodes built with these parameters are the same.
+pub fn same_nodes(one: &serde_json::Value, other: &serde_json::Value) -> bool {
+    let without = |parameters: &serde_json::Value| {
+        let mut parameters = parameters.clone();
+        if let Some(parameters) = parameters.as_object_mut() {
+            parameters.shift_remove(PLACEMENT);
+        }
+        parameters
+    };
+    without(one) == without(other)
 }

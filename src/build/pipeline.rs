@@ -11,7 +11,7 @@ use super::block::{BuiltBlock, build_input};
 use super::disk_sink::{NodeRecord, check_unique};
 use super::forest::{append_nodes, make_errors_monotone};
 use super::inputs::{describe, fingerprint, text_of, unchanged};
-use super::options::BuildOptions;
+use super::options::{BuildOptions, placement_of};
 use super::progress::Progress;
 use super::reuse::Earlier;
 use super::simplify::BUDGET_TOLERANCE;
@@ -21,11 +21,12 @@ use crate::format::{
     check_apart,
 };
 use crate::mesh::{Model, UpAxis, Warnings};
+use crate::place::{Globe, z_up};
 use crate::report::build_report::{
-    BuildReport, Count, InputReport, OverBudget, StageReport, level_reports,
+    BuildReport, Count, FileReport, InputReport, OverBudget, StageReport, UpFrom, level_reports,
 };
 use crate::texture::SharedTextures;
-use crate::{Error, Result, import};
+use crate::{Error, Result, import, tileset};
 
 /// How a build ended.
 #[derive(Debug)]
@@ -45,6 +46,7 @@ pub fn build(
 ) -> Result<Outcome> {
     let begin = Instant::now();
     options.check()?;
+    let globe = options.placement.globe()?;
     let inputs = import::find_inputs(arguments)?;
     // A folder that was given counts as a whole: what is built into it would be an input the next
     // time.
@@ -63,6 +65,7 @@ pub fn build(
     if let Some(earlier) = &earlier
         && still_good.iter().all(Option::is_some)
         && earlier.report.inputs.len() == inputs.len()
+        && earlier.tileset
     {
         return Ok(Outcome::UpToDate(earlier.report.clone()));
     }
@@ -106,7 +109,12 @@ pub fn build(
         let dependencies = model.dependencies.clone();
         let triangles = model.triangle_count() as u64;
         progress.found(triangles);
-        let up = options.up.or(model.up).unwrap_or_else(|| super::up::guess(&model));
+        let (up, up_from) = match (options.up, model.up) {
+            (Some(up), _) => (up, UpFrom::Option),
+            (None, Some(up)) => (up, UpFrom::Format),
+            (None, None) => (super::up::guess(&model), UpFrom::Shape),
+        };
+        check_place(&model, up, globe.as_ref())?;
         let ((built, files), read_ahead) = rayon::join(
             || {
                 rayon::join(
@@ -126,6 +134,7 @@ pub fn build(
             triangles,
             texels: built.used_texels,
             up,
+            up_from: Some(up_from),
             outcomes,
             warnings: Count::of_warnings(&warnings),
         });
@@ -152,10 +161,28 @@ pub fn build(
     for warning in reports.iter().flat_map(|input| &input.warnings) {
         warnings.add(&warning.text, warning.count);
     }
+    if let Some(earlier) = &earlier
+        && earlier.report.tilesets.is_empty()
+    {
+        let file = tileset::TILESET_FILE;
+        let text =
+            format!("earlier result without {file} (by an older version): added to its nodes");
+        warnings.add(text, 1);
+    }
+    if let Some(caveat) = globe.as_ref().and_then(Globe::caveat) {
+        warnings.add(caveat, 1);
+    }
     let over_budget = over_budget(&blocks, &mut warnings);
     let up = agreed_up(&reports, &mut warnings);
     let scene = scene_of(blocks, shared_textures, parameters.clone(), up, &reports)?;
 
+    // As whoever reads the scene will see it.
+    let placement = placement_of(&scene.parameters)?;
+    let mut tilesets = Vec::new();
+    for file in stages.time(Stage::Write, || tileset::files(&scene, &placement))? {
+        output.write(&file.path, &file.bytes)?;
+        tilesets.push(FileReport::of(&file.path, &file.bytes));
+    }
     let mut levels = level_reports(&scene);
     for over in &over_budget {
         if let Some(node) = scene.nodes.iter().find(|node| node.id == over.id) {
@@ -175,6 +202,7 @@ pub fn build(
         peak_memory_bytes: super::memory::peak_bytes(),
         outcomes: most_frequent(reports.iter().flat_map(|input| &input.outcomes).cloned()),
         inputs: reports,
+        tilesets,
         over_budget,
         warnings: Count::of_warnings(&warnings),
     };
@@ -182,6 +210,17 @@ pub fn build(
     output.write(REPORT_FILE, report.to_json()?.as_bytes())?;
     output.commit()?;
     Ok(Outcome::Built(report))
+}
+
+/// Refuses coordinates that cannot be of the place that was asked for.
+fn check_place(model: &Model, up: UpAxis, globe: Option<&Globe>) -> Result<()> {
+    let Some(globe) = globe else { return Ok(()) };
+    let [low, high] = model.bounds();
+    let (low, high) = z_up(up, low, high);
+    match globe.misfit(low, high) {
+        Some(what) => Err(Error::input(&model.source, what)),
+        None => Ok(()),
+    }
 }
 
 /// An input is read while the one before it is built, unless both are large: a file's model takes

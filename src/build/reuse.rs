@@ -3,22 +3,32 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
+
 use super::attributes::Attributes;
 use super::block::BuiltBlock;
 use super::disk_sink::NodeRecord;
 use super::hierarchy::Tree;
+use super::options::same_nodes;
 use crate::Result;
 use crate::format::{NODES_DIR, OutputDir, REPORT_FILE, Scene, SharedTexture, TEXTURES_DIR};
 use crate::mesh::Warnings;
-use crate::report::build_report::{BuildReport, InputReport};
+use crate::report::build_report::{BuildReport, FileReport, InputReport};
 
-/// A result that was made by this version with the same parameters, and is whole.
+/// A result whose nodes were made by this version with the same parameters, and are whole.
 pub struct Earlier {
     dir: PathBuf,
     /// Its scene.
     pub scene: Scene,
     /// How it was made.
     pub report: BuildReport,
+    /// True where its tileset is whole, and for the same place.
+    pub tileset: bool,
+}
+
+fn is_as_written(dir: &Path, file: &FileReport) -> bool {
+    std::fs::read(dir.join(&file.path))
+        .is_ok_and(|bytes| FileReport::of(&file.path, &bytes) == *file)
 }
 
 /// What an unchanged input contributes.
@@ -36,8 +46,8 @@ impl Earlier {
         let text = std::fs::read_to_string(dir.join(REPORT_FILE)).ok()?;
         let report: BuildReport = serde_json::from_str(&text).ok()?;
         let same = report.version == env!("CARGO_PKG_VERSION")
-            && report.parameters == *parameters
-            && scene.parameters == *parameters;
+            && same_nodes(&report.parameters, parameters)
+            && report.parameters == scene.parameters;
         let whole = || {
             scene.nodes.iter().all(|node| {
                 std::fs::metadata(dir.join(NODES_DIR).join(&node.file))
@@ -47,7 +57,13 @@ impl Earlier {
                     .is_ok_and(|facts| facts.len() == texture.bytes)
             })
         };
-        (same && whole()).then(|| Self { dir: dir.to_path_buf(), scene, report })
+        if !(same && whole()) {
+            return None;
+        }
+        let tileset = !report.tilesets.is_empty()
+            && report.parameters == *parameters
+            && report.tilesets.par_iter().all(|file| is_as_written(dir, file));
+        Some(Self { dir: dir.to_path_buf(), scene, report, tileset })
     }
 
     /// What it knows of an input.

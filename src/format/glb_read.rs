@@ -1,12 +1,14 @@
 //! Reads a node's file: the exact inverse of `write_glb`, and of nothing else. Nothing in the
 //! file is trusted, and what is read never takes more memory than a small multiple of its size.
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
 use super::TEXTURES_DIR;
 use super::bytes::Cursor;
 use super::file_name::is_plain_file_name;
+use super::glb_packed::decode;
 use super::glb_schema::{self as schema, *};
 use super::node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 use crate::mesh::{AlphaMode, Wrap};
@@ -97,14 +99,27 @@ fn chunk<'a>(cursor: &mut Cursor<'a>, kind: u32) -> Parsed<&'a [u8]> {
 fn buffer<'a>(root: &Root, bin: Option<&'a [u8]>) -> Parsed<&'a [u8]> {
     match (&root.buffers[..], bin) {
         ([], None) => Ok(&[]),
-        ([buffer], Some(bin)) => bin.get(..buffer.byte_length).ok_or_else(|| {
-            format!("buffer: expected {} bytes, found {}", buffer.byte_length, bin.len())
-        }),
+        ([buffer], Some(bin)) | ([buffer, _], Some(bin)) if is_sound(&root.buffers) => {
+            bin.get(..buffer.byte_length).ok_or_else(|| {
+                format!("buffer: expected {} bytes, found {}", buffer.byte_length, bin.len())
+            })
+        }
         (buffers, bin) => {
             let found = (buffers.len(), usize::from(bin.is_some()));
             Err(format!("found {} buffers and {} binary chunks", found.0, found.1))
         }
     }
+}
+
+/// At most the one buffer that is in the file, and one that stands for what is compressed.
+fn is_sound(buffers: &[Buffer]) -> bool {
+    let is_fallback = |buffer: &Buffer| {
+        buffer.extensions.as_ref().is_some_and(|extensions| extensions.meshopt.fallback)
+    };
+    buffers.iter().zip(0..).all(|(buffer, number)| match number {
+        0 => buffer.extensions.is_none(),
+        _ => is_fallback(buffer),
+    })
 }
 
 /// The local origin in source coordinates, from the one or the other form that is written.
@@ -215,7 +230,7 @@ impl<'a> Reader<'a> {
             return Err(format!("{what}: found normalized {}", accessor.normalized));
         }
         let bytes = self.view(accessor.buffer_view, what)?;
-        let (elements, rest) = bytes.as_chunks::<N>();
+        let (elements, rest) = bytes.as_ref().as_chunks::<N>();
         if elements.len() != accessor.count || !rest.is_empty() {
             return Err(format!(
                 "{what}: expected {} elements of {N} bytes, found {} bytes",
@@ -226,12 +241,29 @@ impl<'a> Reader<'a> {
         Ok(elements.iter().map(element).collect())
     }
 
-    fn view(&mut self, index: usize, what: &str) -> Parsed<&'a [u8]> {
+    fn view(&mut self, index: usize, what: &str) -> Parsed<Cow<'a, [u8]>> {
         let view = entry(&self.root.buffer_views, what, index)?;
         if std::mem::replace(&mut self.spent[index], true) {
             return Err(format!("{what}: buffer view {index} is used twice"));
         }
+        if let Some(ViewExtensions { meshopt }) = &view.extensions {
+            let Compressed { buffer, byte_offset, byte_length, byte_stride, count, mode } = meshopt;
+            let bytes = self.slice(*buffer, *byte_offset, *byte_length, what)?;
+            return decode(bytes, mode, *count, *byte_stride)
+                .map(Cow::Owned)
+                .map_err(|found| format!("{what}: {found}"));
+        }
         let BufferView { buffer, byte_offset, byte_length, .. } = *view;
+        self.slice(buffer, byte_offset, byte_length, what).map(Cow::Borrowed)
+    }
+
+    fn slice(
+        &self,
+        buffer: usize,
+        byte_offset: usize,
+        byte_length: usize,
+        what: &str,
+    ) -> Parsed<&'a [u8]> {
         byte_offset
             .checked_add(byte_length)
             .filter(|_| buffer == 0)

@@ -21,6 +21,7 @@ pub(super) const CLAMP_TO_EDGE: u32 = 33071;
 pub(super) const MIRRORED_REPEAT: u32 = 33648;
 pub(super) const REPEAT: u32 = 10497;
 pub(super) const UNLIT: &str = "KHR_materials_unlit";
+pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
 
 /// Most vertices that u16 indices can refer to: glTF reserves 0xFFFF.
 pub(super) const MOST_SHORT_VERTICES: usize = 0xFFFF;
@@ -35,6 +36,8 @@ pub(super) struct Root {
     pub asset: Asset,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub extensions_used: Vec<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub extensions_required: Vec<String>,
     pub scene: usize,
     pub scenes: Vec<SceneRoots>,
     pub nodes: Vec<Placement>,
@@ -236,11 +239,58 @@ pub(super) struct BufferView {
     pub byte_offset: usize,
     pub byte_length: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub byte_stride: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub extensions: Option<ViewExtensions>,
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub(super) struct Buffer {
     pub byte_length: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub extensions: Option<BufferExtensions>,
+}
+
+/// A buffer that is in no file: what compressed views are without compression.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BufferExtensions {
+    #[serde(rename = "EXT_meshopt_compression")]
+    pub meshopt: Fallback,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Fallback {
+    pub fallback: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ViewExtensions {
+    #[serde(rename = "EXT_meshopt_compression")]
+    pub meshopt: Compressed,
+}
+
+/// Where a view's compressed bytes are.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub(super) struct Compressed {
+    pub buffer: usize,
+    pub byte_offset: usize,
+    pub byte_length: usize,
+    pub byte_stride: usize,
+    pub count: usize,
+    pub mode: Mode,
+}
+
+#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mode {
+    #[serde(rename = "ATTRIBUTES")]
+    Attributes,
+    #[serde(rename = "TRIANGLES")]
+    Triangles,
 }

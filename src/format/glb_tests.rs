@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::glb_write::{NodeLabel, write_glb};
+use super::encoding::Encoding;
+use super::glb_write::{NodeLabel, write_glb, write_glb_encoded};
 use super::node_mesh::{NodeImageData, NodeMesh, Primitive};
 use super::test_mesh::mesh;
 use super::{glb_read::read_glb, glb_schema};
@@ -37,6 +38,71 @@ fn reads_back_what_it_wrote_bit_for_bit() {
         assert_eq!(back, mesh);
         assert_eq!(bits(&back), bits(&mesh));
         assert_eq!(write(&mesh, up), bytes);
+    }
+}
+
+/// Every encoding gives back what was prepared for it; compression may turn triangles.
+#[test]
+fn encodings_lose_nothing_that_was_prepared() {
+    for up in [UpAxis::Y, UpAxis::Z] {
+        for compress in [false, true] {
+            let encoding = Encoding { compress };
+            let mut mesh = mesh();
+            encoding.prepare(&mut mesh);
+            let bytes = write_glb_encoded(&mesh, up, LABEL, encoding).unwrap();
+            let mut back = read(&bytes).unwrap();
+            for (found, expected) in back.primitives.iter_mut().zip(&mesh.primitives) {
+                let turned = |indices: &[u32]| -> Vec<[u32; 3]> {
+                    let turn = |&[a, b, c]: &[u32; 3]| {
+                        [[a, b, c], [b, c, a], [c, a, b]].into_iter().min().unwrap()
+                    };
+                    indices.as_chunks::<3>().0.iter().map(turn).collect()
+                };
+                assert_eq!(turned(&found.indices), turned(&expected.indices));
+                found.indices.clone_from(&expected.indices);
+            }
+            assert_eq!(back, mesh, "{encoding:?}");
+            let json: serde_json::Value =
+                serde_json::from_slice(&bytes[20..20 + json_length(&bytes)]).unwrap();
+            let required = json["extensionsRequired"].to_string();
+            assert_eq!(required.contains("EXT_meshopt_compression"), compress);
+        }
+    }
+}
+
+fn json_length(bytes: &[u8]) -> usize {
+    u32::from_le_bytes([bytes[12], bytes[13], bytes[14], bytes[15]]) as usize
+}
+
+/// A byte that is wrong gives an error or another mesh, never a panic or much memory.
+#[test]
+fn damaged_compressed_files_do_no_harm() {
+    let encoding = Encoding { compress: true };
+    let mut mesh = mesh();
+    encoding.prepare(&mut mesh);
+    let bytes = write_glb_encoded(&mesh, UpAxis::Z, LABEL, encoding).unwrap();
+    for place in 0..bytes.len() {
+        for wrong in [0, 0x7F, 0xFF] {
+            let mut damaged = bytes.clone();
+            damaged[place] = wrong;
+            drop(read(&damaged));
+        }
+    }
+    for (honest, wrong) in
+        [("\"count\":4,", "\"count\":9999999,"), ("\"count\":6,", "\"count\":12,")]
+    {
+        let json = String::from_utf8(bytes[20..20 + json_length(&bytes)].to_vec()).unwrap();
+        let json = json.trim_end().replace(honest, wrong);
+        let width = json.len().next_multiple_of(4);
+        let json = format!("{json:<width$}");
+        let mut damaged = bytes[..12].to_vec();
+        damaged.extend((json.len() as u32).to_le_bytes());
+        damaged.extend(&bytes[16..20]);
+        damaged.extend(json.as_bytes());
+        damaged.extend(&bytes[20 + json_length(&bytes)..]);
+        let length = (damaged.len() as u32).to_le_bytes();
+        damaged[8..12].copy_from_slice(&length);
+        read(&damaged).unwrap_err();
     }
 }
 

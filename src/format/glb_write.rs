@@ -1,7 +1,9 @@
 //! Writes a node as GLB, the binary form of glTF 2.0.
 
 use super::TEXTURES_DIR;
+use super::encoding::Encoding;
 use super::file_name::is_plain_file_name;
+use super::glb_packed::{encode_triangles, encode_vertices};
 use super::glb_schema::{self as schema, *};
 use super::node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 use crate::mesh::{AlphaMode, UpAxis, Wrap};
@@ -26,13 +28,27 @@ pub struct NodeLabel {
 /// Fails where the mesh breaks its own promises: arrays of different lengths, indices out of
 /// range, numbers that are not finite, an origin that does not fit in f32.
 pub fn write_glb(mesh: &NodeMesh, up: UpAxis, label: NodeLabel) -> Result<Vec<u8>> {
+    write_glb_encoded(mesh, up, label, Encoding::default())
+}
+
+/// [`write_glb`] in another encoding. Compression loses nothing, but may turn triangles, so that
+/// another corner is first.
+pub fn write_glb_encoded(
+    mesh: &NodeMesh,
+    up: UpAxis,
+    label: NodeLabel,
+    encoding: Encoding,
+) -> Result<Vec<u8>> {
     let mut writer = Writer {
+        compress: encoding.compress,
+        unpacked: 0,
         root: Root {
             asset: Asset {
                 version: "2.0".into(),
                 generator: concat!("hlod ", env!("CARGO_PKG_VERSION")).into(),
             },
             extensions_used: Vec::new(),
+            extensions_required: Vec::new(),
             scene: 0,
             scenes: vec![SceneRoots { nodes: vec![0] }],
             nodes: vec![placement(mesh, up, label)?],
@@ -148,12 +164,16 @@ fn check(primitive: &Primitive, images: usize) -> Result<(), String> {
 struct Writer {
     root: Root,
     bin: Vec<u8>,
+    compress: bool,
+    /// Bytes that compressed views have without compression.
+    unpacked: usize,
 }
 
 impl Writer {
     fn primitive(&mut self, primitive: &Primitive) -> schema::Primitive {
         let Primitive { positions, texcoords, colors, indices, surface } = primitive;
-        let position = self.accessor(positions.len(), FLOAT, Shape::Vec3, |bin| {
+        let vertices = positions.len();
+        let position = self.vertices(vertices, FLOAT, Shape::Vec3, 12, |bin| {
             extend(bin, positions.as_flattened(), f32::to_le_bytes);
         });
         let (min, max) = positions.iter().fold(
@@ -168,18 +188,24 @@ impl Writer {
         self.root.accessors[position].min = Some(min);
         self.root.accessors[position].max = Some(max);
         let texcoord = (!texcoords.is_empty()).then(|| {
-            self.accessor(texcoords.len(), FLOAT, Shape::Vec2, |bin| {
+            self.vertices(vertices, FLOAT, Shape::Vec2, 8, |bin| {
                 extend(bin, texcoords.as_flattened(), f32::to_le_bytes);
             })
         });
         let color = (!colors.is_empty()).then(|| {
-            let accessor = self.accessor(colors.len(), UNSIGNED_SHORT, Shape::Vec4, |bin| {
+            let accessor = self.vertices(vertices, UNSIGNED_SHORT, Shape::Vec4, 8, |bin| {
                 extend(bin, colors.as_flattened(), u16::to_le_bytes);
             });
             self.root.accessors[accessor].normalized = true;
             accessor
         });
-        let indices = if positions.len() <= MOST_SHORT_VERTICES {
+        let short = vertices <= MOST_SHORT_VERTICES;
+        let packed = self.compress.then(|| encode_triangles(indices, vertices)).flatten();
+        let indices = if let Some(packed) = packed {
+            let (kind, stride) = if short { (UNSIGNED_SHORT, 2) } else { (UNSIGNED_INT, 4) };
+            let view = self.packed(&packed, indices.len(), stride, Mode::Triangles);
+            self.push_accessor(view, indices.len(), kind, Shape::Scalar)
+        } else if short {
             let short: Vec<u16> = indices.iter().map(|&index| index as u16).collect();
             self.accessor(short.len(), UNSIGNED_SHORT, Shape::Scalar, |bin| {
                 extend(bin, &short, u16::to_le_bytes);
@@ -197,6 +223,53 @@ impl Writer {
         }
     }
 
+    /// Adds an accessor of vertices of `stride` bytes with a buffer view of its own.
+    fn vertices(
+        &mut self,
+        count: usize,
+        component_type: u32,
+        shape: Shape,
+        stride: usize,
+        fill: impl FnOnce(&mut Vec<u8>),
+    ) -> usize {
+        if self.compress {
+            let mut bytes = Vec::with_capacity(count * stride);
+            fill(&mut bytes);
+            if let Some(packed) = encode_vertices(&bytes, stride) {
+                let view = self.packed(&packed, count, stride, Mode::Attributes);
+                return self.push_accessor(view, count, component_type, shape);
+            }
+            return self.accessor(count, component_type, shape, |bin| bin.extend(bytes));
+        }
+        self.accessor(count, component_type, shape, fill)
+    }
+
+    /// Adds a compressed buffer view.
+    fn packed(&mut self, packed: &[u8], count: usize, stride: usize, mode: Mode) -> usize {
+        pad(&mut self.bin, 0);
+        let compressed = Compressed {
+            buffer: 0,
+            byte_offset: self.bin.len(),
+            byte_length: packed.len(),
+            byte_stride: stride,
+            count,
+            mode,
+        };
+        self.bin.extend_from_slice(packed);
+        let vertices = mode == Mode::Attributes;
+        let byte_offset = self.unpacked.next_multiple_of(4);
+        self.unpacked = byte_offset + count * stride;
+        self.root.buffer_views.push(BufferView {
+            buffer: 1,
+            byte_offset,
+            byte_length: count * stride,
+            byte_stride: vertices.then_some(stride),
+            target: Some(if vertices { ARRAY_BUFFER } else { ELEMENT_ARRAY_BUFFER }),
+            extensions: Some(ViewExtensions { meshopt: compressed }),
+        });
+        self.root.buffer_views.len() - 1
+    }
+
     /// Adds an accessor with a buffer view of its own.
     fn accessor(
         &mut self,
@@ -207,6 +280,16 @@ impl Writer {
     ) -> usize {
         let target = if shape == Shape::Scalar { ELEMENT_ARRAY_BUFFER } else { ARRAY_BUFFER };
         let buffer_view = self.view(Some(target), fill);
+        self.push_accessor(buffer_view, count, component_type, shape)
+    }
+
+    fn push_accessor(
+        &mut self,
+        buffer_view: usize,
+        count: usize,
+        component_type: u32,
+        shape: Shape,
+    ) -> usize {
         self.root.accessors.push(Accessor {
             buffer_view,
             component_type,
@@ -224,7 +307,15 @@ impl Writer {
         let byte_offset = self.bin.len();
         fill(&mut self.bin);
         let byte_length = self.bin.len() - byte_offset;
-        self.root.buffer_views.push(BufferView { buffer: 0, byte_offset, byte_length, target });
+        let view = BufferView {
+            buffer: 0,
+            byte_offset,
+            byte_length,
+            byte_stride: None,
+            target,
+            extensions: None,
+        };
+        self.root.buffer_views.push(view);
         self.root.buffer_views.len() - 1
     }
 
@@ -290,7 +381,18 @@ impl Writer {
 
     fn finish(mut self) -> Result<Vec<u8>> {
         if !self.bin.is_empty() {
-            self.root.buffers.push(Buffer { byte_length: self.bin.len() });
+            self.root.buffers.push(Buffer { byte_length: self.bin.len(), extensions: None });
+        }
+        let mut require = |extension: &str| {
+            self.root.extensions_used.push(extension.into());
+            self.root.extensions_required.push(extension.into());
+        };
+        if self.unpacked > 0 {
+            require(MESHOPT);
+            self.root.buffers.push(Buffer {
+                byte_length: self.unpacked,
+                extensions: Some(BufferExtensions { meshopt: Fallback { fallback: true } }),
+            });
         }
         pad(&mut self.bin, 0);
         let mut json = serde_json::to_vec(&self.root).map_err(broken)?;

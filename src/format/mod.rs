@@ -4,11 +4,15 @@
 //! out/scene.hlod      the hierarchy: Scene
 //! out/nodes/*.glb     one file per node: NodeMesh
 //! out/textures/*      repeating pictures that many nodes share
+//! out/tileset.json    the same for viewers that read 3D Tiles; see crate::tileset
+//! out/tilesets/*      regions of it, where the city is large
 //! out/build.json      what the build did, for people and scripts
 //! ```
 
 mod bytes;
+mod encoding;
 mod file_name;
+mod glb_packed;
 mod glb_read;
 mod glb_schema;
 #[cfg(test)]
@@ -29,9 +33,10 @@ mod test_mesh;
 #[cfg(test)]
 pub(crate) mod test_scene;
 
+pub use encoding::Encoding;
 pub use file_name::is_plain_file_name;
 pub use glb_read::read_glb;
-pub use glb_write::{NodeLabel, write_glb};
+pub use glb_write::{NodeLabel, write_glb, write_glb_encoded};
 pub use node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 pub use output_dir::{OutputDir, check_apart};
 pub use scene::{BlockInfo, Children, Node, Scene, SharedTexture};

@@ -11,6 +11,7 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
 use super::{NODES_DIR, REPORT_FILE, SCENE_FILE, SCENE_MAGIC, TEXTURES_DIR};
+use crate::tileset::{TILESET_FILE, TILESETS_DIR};
 use crate::{Error, Result};
 
 const PARTIAL: &str = "hlod-partial-";
@@ -243,9 +244,10 @@ fn sorted_names(listing: fs::ReadDir) -> io::Result<Vec<OsString>> {
 fn first_foreign(target: &Path, names: &[OsString]) -> Option<PathBuf> {
     for name in names {
         let kinds: &[&str] = match name.to_str() {
-            Some(SCENE_FILE | REPORT_FILE) => continue,
+            Some(SCENE_FILE | REPORT_FILE | TILESET_FILE) => continue,
             Some(NODES_DIR) => &["glb"],
             Some(TEXTURES_DIR) => &["jpg", "png"],
+            Some(TILESETS_DIR) => &["json"],
             _ => return Some(name.into()),
         };
         // What is not a folder, or cannot be listed, is not ours either.

@@ -102,6 +102,14 @@ pub struct Model {
 }
 
 impl Model {
+    /// Least and greatest coordinates of all vertices.
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        let empty = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        self.parts.iter().flat_map(|part| &part.positions).fold(empty, |[low, high], p| {
+            [std::array::from_fn(|i| low[i].min(p[i])), std::array::from_fn(|i| high[i].max(p[i]))]
+        })
+    }
+
     /// The number of triangles in all parts.
     pub fn triangle_count(&self) -> usize {
         self.parts.iter().map(|part| part.indices.len() / 3).sum()

@@ -29,6 +29,10 @@ pub struct BuildReport {
     pub peak_memory_bytes: u64,
     /// How often each reason or step of the ladder occurred, most frequent first.
     pub outcomes: Vec<Count>,
+    /// The files of the tileset, relative to the folder; none in results of versions that wrote
+    /// no tileset.
+    #[serde(default)]
+    pub tilesets: Vec<FileReport>,
     /// Nodes that have more triangles than their budget allows, in order of id.
     pub over_budget: Vec<OverBudget>,
     /// What was imperfect and how often, in the order in which it was met.
@@ -48,6 +52,9 @@ pub struct InputReport {
     pub texels: u64,
     /// Which of its axes points at the sky.
     pub up: UpAxis,
+    /// How that is known; `None` in results of versions that did not say.
+    #[serde(default)]
+    pub up_from: Option<UpFrom>,
     /// How often each step of the ladder made one of its nodes, most frequent first.
     pub outcomes: Vec<Count>,
     /// What was imperfect in it and how often, in the order in which it was met.
@@ -63,6 +70,29 @@ pub struct FileReport {
     pub bytes: u64,
     /// BLAKE3 of its contents, in hexadecimal; empty where it was not there.
     pub blake3: String,
+}
+
+/// How it is known which axis points at the sky.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum UpFrom {
+    /// It was asked for.
+    Option,
+    /// The input's format says so.
+    Format,
+    /// From the shape: an assumption.
+    Shape,
+}
+
+impl FileReport {
+    /// Of a file's contents.
+    pub fn of(path: &str, bytes: &[u8]) -> Self {
+        Self {
+            path: path.into(),
+            bytes: bytes.len() as u64,
+            blake3: blake3::hash(bytes).to_hex().to_string(),
+        }
+    }
 }
 
 /// The nodes of one level.

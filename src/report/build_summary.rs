@@ -3,7 +3,9 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::build_report::BuildReport;
+use super::build_report::{BuildReport, UpFrom};
+use crate::build::options::placement_of;
+use crate::place::Placement;
 
 /// Warnings that are shown; the rest is in `build.json`.
 const SHOWN_WARNINGS: usize = 8;
@@ -50,6 +52,7 @@ pub fn built(report: &BuildReport, out: &Path) -> String {
         rate / 1e3,
         report.peak_memory_bytes as f64 / 1e6
     );
+    let _ = writeln!(text, "  {}", orientation(report));
     let stages: Vec<String> = report
         .stages
         .iter()
@@ -65,6 +68,32 @@ pub fn built(report: &BuildReport, out: &Path) -> String {
         let _ = writeln!(text, "  and {more} more warnings in build.json");
     }
     text
+}
+
+/// Which axis points at the sky, and how that is known; of the first input, whose word counts.
+fn orientation(report: &BuildReport) -> String {
+    let Some(input) = report.inputs.first() else { return String::new() };
+    let from = match input.up_from {
+        Some(UpFrom::Option) => " (--up)",
+        Some(UpFrom::Format) => " (the format says so)",
+        Some(UpFrom::Shape) => " (assumed from the shape; --up says otherwise)",
+        None => "",
+    };
+    let place = match placement_of(&report.parameters) {
+        Ok(Placement::Crs { epsg, height_offset }) => {
+            let heights = if height_offset == 0.0 {
+                "heights taken as over the ellipsoid".into()
+            } else {
+                format!("heights raised by {height_offset} m")
+            };
+            format!("; coordinates of EPSG:{epsg}, {heights}")
+        }
+        Ok(Placement::Origin { lon, lat, height }) => {
+            format!("; metres from {lon}° east, {lat}° north, {height} m over the ellipsoid")
+        }
+        _ => "; no place on the Earth (--crs, --origin)".into(),
+    };
+    format!("{:?} is up{from}{place}", input.up)
 }
 
 /// After finding that nothing had changed.

@@ -10,11 +10,13 @@ use super::options::Limits;
 use super::progress::Progress;
 use super::report::{Check, Failure};
 use crate::build::attributes::{TEXTURED_WEIGHT, attributes};
+use crate::build::options::placement_of;
 use crate::format::{
     NODES_DIR, Node, NodeImageData, NodeMesh, Scene, TEXTURES_DIR, file_crc, read_glb,
 };
 use crate::import::texture_size;
 use crate::mesh::{TextureData, TextureSource};
+use crate::tileset::{self, TILESET_FILE};
 
 const REBUILD: &str = "build the scene again with --force";
 const REPORT: &str = "build again with --force; if it stays, this is a fault of the builder";
@@ -56,13 +58,42 @@ pub(super) fn structure(
         Some(Failure { place, what, hint: REBUILD })
     }));
     check.extend(tree_failures(scene));
+    let tiles = tileset_failures(out, scene, &mut check);
     check.summary = format!(
-        "{} nodes and {} shared pictures read, checksums and {} attributes each",
+        "{} nodes and {} shared pictures read, checksums and {ATTRIBUTES} attributes each; {tiles}",
         scene.nodes.len(),
         scene.shared_textures.len(),
-        ATTRIBUTES
     );
     (geometry, check)
+}
+
+/// Checks the tileset; says what was looked at.
+fn tileset_failures(out: &Path, scene: &Scene, check: &mut Check) -> String {
+    if !out.join(TILESET_FILE).exists() {
+        let what = "is missing: an older version built this folder, or it was removed";
+        check.fail(TILESET_FILE, what, "build the scene again; its nodes are kept");
+        return "no tileset".into();
+    }
+    match placement_of(&scene.parameters)
+        .and_then(|placement| tileset::check(out, scene, &placement))
+    {
+        Err(error) => {
+            check.fail(TILESET_FILE, error.to_string(), REBUILD);
+            "no tileset".into()
+        }
+        Ok(checked) => {
+            let faults = checked.faults.into_iter();
+            check.extend(faults.map(|tileset::Fault { place, what }| Failure {
+                place,
+                what,
+                hint: REBUILD,
+            }));
+            let placed = checked.placed_within.map_or(String::new(), |off| {
+                format!(", leaves within {:.1} mm of their place on the Earth", off * 1e3)
+            });
+            format!("{} tiles in {} tilesets{placed}", checked.tiles, checked.files)
+        }
+    }
 }
 
 /// Attributes that [`attribute_failures`] looks at.

@@ -188,7 +188,8 @@ fn check_pictures(what: &str, case: &Case, index: usize) {
 fn the_files_are_those_of_the_scene_and_no_others() {
     for case in cases() {
         let scene = &case.built.scene;
-        let mut expected: BTreeSet<String> = ["scene.hlod", "build.json"].map(String::from).into();
+        let mut expected: BTreeSet<String> =
+            ["scene.hlod", "build.json", "tileset.json"].map(String::from).into();
         expected.extend(scene.nodes.iter().map(|node| format!("nodes/{}", node.file)));
         expected.extend(
             scene.shared_textures.iter().map(|texture| format!("textures/{}", texture.file_name)),

@@ -10,6 +10,7 @@ use hlod::city::CityOptions;
 use hlod::format::{
     NODES_DIR, NodeImageData, NodeLabel, NodeMesh, SCENE_FILE, Scene, file_crc, read_glb, write_glb,
 };
+use hlod::place::Placement;
 use hlod::verify::{Silent, VerifyOptions, VerifyReport, verify};
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
@@ -106,6 +107,9 @@ impl Broken {
 
     pub fn report(&self, with_source: bool) -> VerifyReport {
         fs::write(self.out.path().join(SCENE_FILE), self.scene.to_bytes().unwrap()).unwrap();
+        for file in hlod::tileset::files(&self.scene, &Placement::Local).unwrap() {
+            fs::write(self.out.path().join(file.path), file.bytes).unwrap();
+        }
         report(self.out.path(), with_source)
     }
 

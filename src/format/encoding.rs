@@ -1,0 +1,76 @@
+//! How a node's geometry is stored: plain or compressed.
+
+use super::node_mesh::{NodeMesh, Primitive};
+
+/// How a node's geometry is stored. The default is a form that all viewers read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Encoding {
+    /// Vertices and indices are compressed without loss (`EXT_meshopt_compression`).
+    pub compress: bool,
+}
+
+impl Encoding {
+    /// Orders a mesh as it is stored best.
+    pub fn prepare(&self, mesh: &mut NodeMesh) {
+        if self.compress {
+            mesh.primitives.iter_mut().for_each(order);
+        }
+    }
+}
+
+/// Triangles near each other in space follow each other, and vertices follow triangles: what
+/// resembles its neighbour takes few bits.
+fn order(primitive: &mut Primitive) {
+    let Primitive { positions, texcoords, colors, indices, .. } = primitive;
+    let vertices = positions.len();
+    *indices = meshopt::optimize_vertex_cache(indices, vertices);
+    let remap = meshopt::optimize_vertex_fetch_remap(indices, vertices);
+    let kept = remap.iter().filter(|&&to| to != u32::MAX).count();
+    fn moved<T: Copy + Default>(from: &[T], remap: &[u32], kept: usize) -> Vec<T> {
+        if from.is_empty() {
+            return Vec::new();
+        }
+        let mut to = vec![T::default(); kept];
+        for (value, &place) in from.iter().zip(remap) {
+            if let Some(slot) = to.get_mut(place as usize) {
+                *slot = *value;
+            }
+        }
+        to
+    }
+    *positions = moved(positions, &remap, kept);
+    *texcoords = moved(texcoords, &remap, kept);
+    *colors = moved(colors, &remap, kept);
+    for index in indices {
+        *index = remap[*index as usize];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_mesh::mesh;
+    use super::*;
+
+    #[test]
+    fn ordering_keeps_every_triangle() {
+        let mut ordered = mesh();
+        Encoding { compress: true }.prepare(&mut ordered);
+        for (before, after) in mesh().primitives.iter().zip(&ordered.primitives) {
+            let corners = |p: &Primitive| {
+                let of_triangle = |corners: &[u32]| {
+                    let mut corners: Vec<[u32; 3]> = corners
+                        .iter()
+                        .map(|&i| p.positions[i as usize].map(f32::to_bits))
+                        .collect();
+                    corners.sort_unstable();
+                    corners
+                };
+                let mut triangles: Vec<_> = p.indices.chunks(3).map(of_triangle).collect();
+                triangles.sort_unstable();
+                triangles
+            };
+            assert_eq!(corners(before), corners(after));
+            assert_eq!(before.texcoords.len(), after.texcoords.len());
+        }
+    }
+}
