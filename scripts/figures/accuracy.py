@@ -26,6 +26,8 @@ VARIANTS = [
     ("clustering, from original", ["--simplifier", "clustering", "--simplify-from", "original"]),
     ("borders shared", ["--borders", "shared"]),
     ("borders locked", ["--borders", "locked"]),
+    ("seams kept", ["--seams", "keep"]),
+    ("all seams baked", ["--seams", "bake"]),
     ("300 triangles a node", ["--desired-tris", "300"]),
     ("2,000 triangles a node", ["--desired-tris", "2000"]),
     ("5,000 triangles a node", ["--desired-tris", "5000"]),
@@ -93,8 +95,9 @@ def conditions(arguments):
         f"Errors are those of a front of at most {SHARE:.0%} of the source's triangles, cut where "
         "the stored errors say, two-sided and in units of 1e-4 of the diagonal of the bounding "
         f"box, by {arguments.samples:,} points spread over each surface (`hlod-build verify "
-        f"--front {SHARE}`); *colour* is the RMS difference of 255 at the same points; *MB* is all "
-        "that was written."
+        f"--front {SHARE}`); *colour* is the RMS difference of 255 at the same points; *baking* is "
+        "the part of the seconds that charts and textures of baked nodes took; *MB* is all that was "
+        "written."
     )
 
 
@@ -141,19 +144,21 @@ def measured(programs, models, options, arguments):
         "color": front["color_rms"],
         "triangles": front["triangles"],
         "skirts": front["cut_plane_triangles"],
+        "bake": {stage["stage"]: stage["seconds"] for stage in report["stages"]}["bake"],
         "bytes": size,
         "source": report["source_triangles"],
     }
 
 
 def variant_table(rows):
-    head = ["", "seconds", "triangles of the front", "RMS", "max", "colour", "MB"]
+    head = ["", "seconds", "baking", "triangles of the front", "RMS", "max", "colour", "MB"]
     cells = []
     for name, row in rows.items():
         color = "–" if row["color"] is None else f"{row['color']:.1f}"
         share = row["triangles"] / row["source"]
         cells.append(
-            [name, f"{row['seconds']:.2f}", f"{row['triangles']:,} ({share:.1%})"]
+            [name, f"{row['seconds']:.2f}", f"{row['bake']:.2f}"]
+            + [f"{row['triangles']:,} ({share:.1%})"]
             + [f"{row['rms']:.3f}", f"{row['max']:.1f}", color, f"{row['bytes'] / 1e6:.1f}"]
         )
     return table(head, cells)

@@ -17,6 +17,7 @@ use hlod::format::Scene;
 use hlod::mesh::UpAxis;
 use hlod::place::Placement;
 use hlod::report::{build_summary, inspect};
+use hlod::texture::Seams;
 use hlod::verify::{self, VerifyOptions, verify};
 use hlod::{Error, Result};
 use indicatif::{HumanCount, ProgressBar, ProgressStyle};
@@ -124,6 +125,10 @@ struct BuildArgs {
     /// covers the gaps between levels, `shared` leaves those gaps, `locked` keeps every vertex
     #[arg(long, value_enum, default_value_t = BordersArg::Skirts, help_heading = "Hierarchy")]
     borders: BordersArg,
+    /// What happens to texture seams in coarse nodes: `keep` simplifies around them, `auto` gives
+    /// nodes whose seams are in the way a texture of their own, `bake` all of them
+    #[arg(long, value_enum, default_value_t = SeamsArg::Auto, help_heading = "Hierarchy")]
+    seams: SeamsArg,
     /// The axis that points at the sky, where the input does not say [default: looked up in the
     /// format, else guessed from the shape]
     #[arg(long, value_enum, help_heading = "Hierarchy")]
@@ -178,6 +183,16 @@ enum CompressArg {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
+enum SeamsArg {
+    /// Simplification works around them
+    Keep,
+    /// Given up where they are in the way
+    Auto,
+    /// Given up in every coarse node
+    Bake,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum SimplifierArg {
     /// Quadric error metrics
     Qem,
@@ -217,6 +232,11 @@ impl BuildArgs {
                 simplifier: match self.simplifier {
                     SimplifierArg::Qem => Simplifier::Qem,
                     SimplifierArg::Clustering => Simplifier::Clustering,
+                },
+                seams: match self.seams {
+                    SeamsArg::Keep => Seams::Keep,
+                    SeamsArg::Auto => Seams::Auto,
+                    SeamsArg::Bake => Seams::Bake,
                 },
                 borders: match self.borders {
                     BordersArg::Locked => BorderMode::Locked,

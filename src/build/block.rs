@@ -155,8 +155,12 @@ pub fn build_input(
             return Ok((None, warnings, 0));
         }
         let factors = simplifications(piece.mesh.triangles.len(), &options.hierarchy);
-        let texture_options =
-            TextureOptions { jpeg_quality: options.jpeg_quality, max_atlas: options.max_atlas };
+        let texture_options = TextureOptions {
+            jpeg_quality: options.jpeg_quality,
+            max_atlas: options.max_atlas,
+            seams: options.hierarchy.seams,
+            root_triangles: (piece.mesh.triangles.len() as f64 / factors[0]) as usize,
+        };
         let textures = stages.time(Stage::Pictures, || {
             let level_factor = f64::from(options.hierarchy.level_factor);
             let texel_factors = texture_factors(&factors, level_factor);
@@ -173,8 +177,14 @@ pub fn build_input(
             stages,
             progress,
         };
-        let builder =
-            BlockBuilder { options: &options.hierarchy, factors, lattice, sink: &sink, stages };
+        let builder = BlockBuilder {
+            options: &options.hierarchy,
+            factors,
+            bake: textures.bake_plan(),
+            lattice,
+            sink: &sink,
+            stages,
+        };
         let tree = builder.build(piece)?;
         let info = BlockInfo { name, input: super::inputs::text_of(&model.source), origin };
         Ok((Some(BuiltBlock { info, tree }), warnings, textures.used_texels()))

@@ -10,7 +10,7 @@ use crate::format::{
     Encoding, NODES_DIR, NodeImageData, NodeLabel, OutputDir, file_crc, write_glb_encoded,
 };
 use crate::mesh::{Mesh, UpAxis, Warnings};
-use crate::texture::{BlockTextures, TexturedNode};
+use crate::texture::{BakeReason, BakedMesh, BlockTextures, TexturedNode};
 use crate::{Error, Result};
 
 /// What is kept of a written node.
@@ -38,6 +38,8 @@ pub struct NodeRecord {
     pub budget: usize,
     /// How it was made; `None` where it was taken over from an earlier build.
     pub step: Option<LadderStep>,
+    /// Why it has a texture of its own, where it has.
+    pub baked: Option<BakeReason>,
     /// Why it has more than it may, where it has.
     pub reason: Option<String>,
     /// What was imperfect.
@@ -91,7 +93,13 @@ impl NodeSink for DiskSink<'_> {
             format!("{}-{}.glb", self.prefix, place.join("."))
         };
         let id = node_id(&file);
-        let textured = self.stages.time(Stage::Atlas, || self.textured(node))?;
+        let baked = node.baked.and_then(|_| {
+            self.stages.time(Stage::Bake, || self.textures.bake(node.mesh, node.level))
+        });
+        let textured = self.stages.time(Stage::Atlas, || match baked {
+            Some(baked) => self.baked(node, baked),
+            None => self.textured(node),
+        })?;
         let TexturedNode { mut mesh, warnings, .. } = textured;
         self.stages.time(Stage::Write, || {
             let label = NodeLabel { id, level: node.level as u32 };
@@ -128,6 +136,7 @@ impl NodeSink for DiskSink<'_> {
                 level: node.level as u32,
                 budget: node.budget,
                 step: Some(node.step),
+                baked: node.baked,
                 reason: over_budget(node, attributes.triangles as usize),
                 warnings,
             })
@@ -140,6 +149,12 @@ impl NodeSink for DiskSink<'_> {
 }
 
 impl DiskSink<'_> {
+    fn baked(&self, node: &NodeDraft, mut baked: BakedMesh) -> Result<TexturedNode> {
+        let skirts = skirt::rehung(node.skirts, node.mesh, &baked.mesh);
+        let alike = skirt::append(&mut baked.mesh, &skirts);
+        self.textures.baked_node_mesh(&baked, &alike, node.level, self.origin)
+    }
+
     fn textured(&self, node: &NodeDraft) -> Result<TexturedNode> {
         if node.skirts.is_empty() {
             return self.textures.node_mesh(node.mesh, &[], node.level, self.origin);

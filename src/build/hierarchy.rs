@@ -16,12 +16,14 @@ use super::distance::hausdorff;
 use super::lattice::Lattice;
 use super::merge::merge;
 use super::remnant::remnant;
+use super::seamless::without_seams;
 use super::simplify::{AppearanceWeights, LadderStep, Simplified, Simplifier, simplify};
 use super::skirt::{Skirt, skirts, triangles_of};
 use super::stages::{Stage, Stages};
 use super::thin_border::thin_border;
 use crate::Result;
 use crate::mesh::Mesh;
+use crate::texture::{BakePlan, BakeReason, Seams};
 
 /// What a coarse node is simplified from.
 #[derive(
@@ -75,6 +77,8 @@ pub struct HierarchyOptions {
     pub borders: BorderMode,
     /// See [`AppearanceWeights`].
     pub weights: AppearanceWeights,
+    /// See [`Seams`].
+    pub seams: Seams,
     /// See [`CutTolerance`].
     pub tolerance: CutTolerance,
 }
@@ -88,6 +92,7 @@ impl Default for HierarchyOptions {
             simplifier: Simplifier::default(),
             borders: BorderMode::default(),
             weights: AppearanceWeights::default(),
+            seams: Seams::default(),
             tolerance: CutTolerance::default(),
         }
     }
@@ -123,6 +128,8 @@ pub struct NodeDraft<'a> {
     pub geometric_error: f64,
     /// How it was made.
     pub step: LadderStep,
+    /// Why it needs a texture of its own, where it does.
+    pub baked: Option<BakeReason>,
     /// Border vertices that were locked.
     pub locked: usize,
 }
@@ -154,6 +161,8 @@ pub struct BlockBuilder<'a, S> {
     pub options: &'a HierarchyOptions,
     /// From [`simplifications`].
     pub factors: Vec<f64>,
+    /// The seams that coarse nodes may ignore, where there are some in the way.
+    pub bake: Option<BakePlan<'a>>,
     /// The block's lattice.
     pub lattice: Lattice,
     /// Where nodes go.
@@ -169,6 +178,8 @@ struct Carried {
     /// The pieces of its border, if skirts are to cover them.
     runs: Vec<BorderRun>,
     error: f64,
+    /// A texture of its own stands for its texture coordinates.
+    baked: bool,
 }
 
 impl<S: NodeSink> BlockBuilder<'_, S> {
@@ -197,6 +208,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
                 budget: triangles,
                 geometric_error: 0.0,
                 step: LadderStep::Original,
+                baked: None,
                 locked: 0,
             })?;
             self.sink.leaves_done(triangles);
@@ -215,7 +227,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
                     BorderMode::Skirts => original_runs(&mesh, &border, &path),
                     BorderMode::Locked | BorderMode::Shared => Vec::new(),
                 };
-                let source = Carried { mesh, border, runs, error: 0.0 };
+                let source = Carried { mesh, border, runs, error: 0.0, baked: false };
                 self.coarse_node(source, &path, level, place, budget)
             };
             let (node, children) = rayon::join(simplify, || self.children(piece, level, place));
@@ -229,8 +241,9 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
                 parts.iter().map(|part| (&part.mesh, &part.border)).collect();
             let (mesh, border) = merge(&pairs, path.len());
             let error = parts.iter().map(|part| part.error).fold(0.0, f64::max);
+            let baked = parts.iter().any(|part| part.baked);
             let runs = parts.into_iter().flat_map(|part| part.runs).collect();
-            let source = Carried { mesh, border, runs, error };
+            let source = Carried { mesh, border, runs, error, baked };
             let (record, carried) = self.coarse_node(source, &path, level, place, budget)?;
             (carried, record, trees)
         };
@@ -358,24 +371,35 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         place: &[u32],
         budget: usize,
     ) -> Result<(S::Record, Carried)> {
-        let Carried { mesh: source_mesh, mut border, runs, error: error_below } = source;
-        let at = level as u8;
-        let step = self.lattice.step;
-        let (simplified, runs, skirts) = self.stages.time(Stage::Simplify, || {
-            let mut mesh = source_mesh.clone();
-            thin_border(&mut mesh, &mut border, path, at);
-            // Skirts count towards the budget, but may not take more than half of it.
-            let runs = join_runs(runs, path, at, &mesh, &border);
-            let skirt_triangles = triangles_of(&skirts(&mesh, &border, &runs, path, step));
-            let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
-            let HierarchyOptions { simplifier, weights, .. } = *self.options;
-            let mut result = simplify(&mesh, &border, path, at, target, simplifier, weights);
-            if result.mesh.triangles.is_empty() {
-                result = remnant(&source_mesh, &border, LEAST_TRIANGLES.min(target));
+        let Carried { mesh: mut source_mesh, mut border, runs, error: error_below, baked } = source;
+        let simplified = |mesh: &Mesh, border: Border, runs, keep_folds| {
+            self.stages.time(Stage::Simplify, || {
+                self.simplified(mesh, border, runs, path, level, budget, keep_folds)
+            })
+        };
+        // Why it is baked, and where that is not known yet, what there is with its seams.
+        let (mut reason, mut kept) = (None, None);
+        if let Some(plan) = self.bake {
+            reason = plan.always.or(baked.then_some(BakeReason::Below));
+            if reason.is_none() {
+                let coarse = simplified(&source_mesh, border.clone(), runs.clone(), false);
+                if coarse.0.step == LadderStep::Collapse {
+                    kept = Some(coarse);
+                } else {
+                    reason = Some(BakeReason::Seams);
+                }
             }
-            let skirts = skirts(&result.mesh, &result.border, &runs, path, step);
-            (result, runs, skirts)
-        });
+            if reason.is_some() {
+                (source_mesh, border) = self
+                    .stages
+                    .time(Stage::Simplify, || without_seams(&source_mesh, &border, plan.classes));
+            }
+        }
+        let coarse = match kept {
+            Some(kept) => kept,
+            None => simplified(&source_mesh, border, runs, reason.is_some()),
+        };
+        let (simplified, runs, skirts) = coarse;
         let Simplified { mesh, border, step, .. } = simplified;
         let error = self.stages.time(Stage::Measure, || hausdorff(&source_mesh, &mesh));
         let total_error = error_below + error;
@@ -387,8 +411,38 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             budget,
             geometric_error: total_error,
             step,
+            baked: reason,
             locked: border.planes.iter().filter(|&&planes| planes & path.bits() != 0).count(),
         })?;
-        Ok((record, Carried { mesh, border, runs, error: total_error }))
+        Ok((record, Carried { mesh, border, runs, error: total_error, baked: reason.is_some() }))
+    }
+
+    /// The geometry of a node that is not a leaf, what is left of its border's pieces, and its
+    /// skirts.
+    fn simplified(
+        &self,
+        source: &Mesh,
+        mut border: Border,
+        runs: Vec<BorderRun>,
+        path: &Path,
+        level: usize,
+        budget: usize,
+        keep_folds: bool,
+    ) -> (Simplified, Vec<BorderRun>, Vec<Skirt>) {
+        let (at, step) = (level as u8, self.lattice.step);
+        let mut mesh = source.clone();
+        thin_border(&mut mesh, &mut border, path, at);
+        // Skirts count towards the budget, but may not take more than half of it.
+        let runs = join_runs(runs, path, at, &mesh, &border);
+        let skirt_triangles = triangles_of(&skirts(&mesh, &border, &runs, path, step));
+        let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
+        let HierarchyOptions { simplifier, weights, .. } = *self.options;
+        let weights = AppearanceWeights { keep_folds, ..weights };
+        let mut result = simplify(&mesh, &border, path, at, target, simplifier, weights);
+        if result.mesh.triangles.is_empty() {
+            result = remnant(source, &border, LEAST_TRIANGLES.min(target));
+        }
+        let skirts = skirts(&result.mesh, &result.border, &runs, path, step);
+        (result, runs, skirts)
     }
 }

@@ -25,6 +25,7 @@ pub mod pipeline;
 pub mod progress;
 pub mod remnant;
 pub mod reuse;
+pub mod seamless;
 pub mod shared_borders;
 pub mod simplify;
 pub mod skirt;

@@ -74,6 +74,7 @@ impl BuildOptions {
             "simplifier": hierarchy.simplifier,
             "simplify_from": hierarchy.simplify_from,
             "borders": hierarchy.borders,
+            "seams": hierarchy.seams,
             "texture_weight": shortest(hierarchy.weights.texture),
             "color_weight": shortest(hierarchy.weights.color),
             "up": self.up,

@@ -14,7 +14,7 @@ use super::inputs::{describe, fingerprint, text_of, unchanged};
 use super::options::{BuildOptions, placement_of};
 use super::progress::Progress;
 use super::reuse::Earlier;
-use super::simplify::BUDGET_TOLERANCE;
+use super::simplify::{BUDGET_TOLERANCE, LadderStep};
 use super::stages::{Stage, Stages};
 use crate::format::{
     BlockInfo, NODES_DIR, OutputDir, REPORT_FILE, SCENE_FILE, Scene, SharedTexture, TEXTURES_DIR,
@@ -23,9 +23,10 @@ use crate::format::{
 use crate::mesh::{Model, UpAxis, Warnings};
 use crate::place::{Globe, z_up};
 use crate::report::build_report::{
-    BuildReport, Count, FileReport, InputReport, OverBudget, StageReport, UpFrom, level_reports,
+    Baked, BuildReport, Count, FileReport, InputReport, OverBudget, StageReport, UpFrom,
+    level_reports,
 };
-use crate::texture::SharedTextures;
+use crate::texture::{BakeReason, SharedTextures};
 use crate::{Error, Result, import, tileset};
 
 /// How a build ended.
@@ -173,6 +174,7 @@ pub fn build(
         warnings.add(caveat, 1);
     }
     let over_budget = over_budget(&blocks, &mut warnings);
+    let baked = baked(&blocks);
     let up = agreed_up(&reports, &mut warnings);
     let scene = scene_of(blocks, shared_textures, parameters.clone(), up, &reports)?;
 
@@ -204,6 +206,7 @@ pub fn build(
         inputs: reports,
         tilesets,
         over_budget,
+        baked,
         warnings: Count::of_warnings(&warnings),
     };
     output.write(SCENE_FILE, &scene.to_bytes()?)?;
@@ -246,7 +249,9 @@ fn outcomes(blocks: &[BuiltBlock], warnings: &mut Warnings) -> Vec<Count> {
     let mut steps = Vec::new();
     for block in blocks {
         block.for_each(&mut |record: &NodeRecord| {
-            steps.extend(record.step.map(|step| Count { text: step.describe().into(), count: 1 }));
+            let baked = record.baked.filter(|_| record.step.is_some()).map(BakeReason::describe);
+            let texts = record.step.map(LadderStep::describe).into_iter().chain(baked);
+            steps.extend(texts.map(|text| Count { text: text.into(), count: 1 }));
             warnings.extend(record.warnings.clone());
         });
     }
@@ -289,6 +294,19 @@ fn over_budget(blocks: &[BuiltBlock], warnings: &mut Warnings) -> Vec<OverBudget
         over_budget.len() as u64,
     );
     over_budget
+}
+
+/// The nodes with textures of their own, by id.
+fn baked(blocks: &[BuiltBlock]) -> Vec<Baked> {
+    let mut baked = Vec::new();
+    for block in blocks {
+        block.for_each(&mut |record: &NodeRecord| {
+            let entry = |reason| Baked { id: record.id, file: record.file.clone(), reason };
+            baked.extend(record.baked.map(entry));
+        });
+    }
+    baked.sort_by_key(|baked: &Baked| baked.id);
+    baked
 }
 
 /// Joins the blocks' trees to a scene.

@@ -111,6 +111,9 @@ impl Earlier {
             .map(|child| self.tree(child, output, taken))
             .collect::<Result<Vec<_>>>()?;
         let over = self.report.over_budget.iter().find(|over| over.id == node.id);
+        // In order of id.
+        let baked = self.report.baked.binary_search_by_key(&node.id, |baked| baked.id);
+        let baked = baked.ok().map(|place| &self.report.baked[place]);
         Ok(Tree {
             record: NodeRecord {
                 id: node.id,
@@ -133,6 +136,7 @@ impl Earlier {
                 level: node.level,
                 budget: over.map_or(0, |over| over.budget as usize),
                 step: None,
+                baked: baked.map(|baked| baked.reason),
                 reason: over.map(|over| over.reason.clone()),
                 warnings: Warnings::default(),
             },

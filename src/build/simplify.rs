@@ -78,11 +78,15 @@ pub struct AppearanceWeights {
     pub texture: f32,
     /// A change of vertex colour from 0 to 1 counts as this share of the piece's extent.
     pub color: f32,
+    /// Edges over which the surface folds back on itself stay. Thin parts keep their tips so where
+    /// no texture does that: all planes near the tip of a needle lie along it, so that quadrics
+    /// alone find nothing in shortening it.
+    pub keep_folds: bool,
 }
 
 impl Default for AppearanceWeights {
     fn default() -> Self {
-        Self { texture: 0.25, color: 0.05 }
+        Self { texture: 0.25, color: 0.05, keep_folds: false }
     }
 }
 
@@ -189,6 +193,9 @@ fn collapse(
         .map(|&locked| if locked { SimplifyVertex::Lock } else { SimplifyVertex::None })
         .collect();
     let mut options = SimplifyOptions::ErrorAbsolute;
+    if weights.keep_folds {
+        options |= SimplifyOptions::PreserveFolds;
+    }
     if step != LadderStep::Collapse {
         options |= SimplifyOptions::Permissive;
     }

@@ -12,6 +12,8 @@
 //! An end of the edge may lie beside the plane rather than on it ([`super::cut`]). From there to
 //! the polyline's next vertex the region leaves the plane, and a triangle closes that part.
 
+use rustc_hash::FxHashMap;
+
 use super::border::{Border, Path};
 use super::border_run::{BorderRun, edges_of};
 use crate::mesh::{Mesh, wide};
@@ -139,6 +141,26 @@ impl Skirt {
 /// Triangles of the skirts.
 pub fn triangles_of(skirts: &[Skirt]) -> usize {
     skirts.iter().map(|skirt| skirt.triangles.len()).sum()
+}
+
+/// The skirts of `before` on a mesh of the same triangles, some of whose vertices became two: each
+/// hangs on the vertices of the triangle that has its edge.
+pub fn rehung(skirts: &[Skirt], before: &Mesh, after: &Mesh) -> Vec<Skirt> {
+    if skirts.is_empty() {
+        return Vec::new();
+    }
+    let mut edges: FxHashMap<[u32; 2], [u32; 2]> = FxHashMap::default();
+    for (&[a, b, c], &[p, q, r]) in before.triangles.iter().zip(&after.triangles) {
+        for (edge, own) in [([a, b], [p, q]), ([b, c], [q, r]), ([c, a], [r, p])] {
+            edges.entry(edge).or_insert(own);
+            edges.entry([edge[1], edge[0]]).or_insert([own[1], own[0]]);
+        }
+    }
+    let rehung = |skirt: &Skirt| {
+        let edge = edges.get(&skirt.edge).copied().unwrap_or(skirt.edge);
+        Skirt { edge, ..skirt.clone() }
+    };
+    skirts.iter().map(rehung).collect()
 }
 
 /// Appends the skirts to a mesh. Returns pairs of vertices that look alike: a skirt's corner and

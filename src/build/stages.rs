@@ -20,6 +20,8 @@ pub enum Stage {
     Simplify,
     /// Measuring what simplification moved.
     Measure,
+    /// Charts and textures of nodes that are simplified across seams.
+    Bake,
     /// Packing and encoding atlases.
     Atlas,
     /// Making and writing node files.
@@ -28,7 +30,7 @@ pub enum Stage {
 
 impl Stage {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Compare,
         Self::Import,
         Self::Gather,
@@ -36,6 +38,7 @@ impl Stage {
         Self::Cut,
         Self::Simplify,
         Self::Measure,
+        Self::Bake,
         Self::Atlas,
         Self::Write,
     ];
@@ -50,6 +53,7 @@ impl Stage {
             Self::Cut => "cut",
             Self::Simplify => "simplify",
             Self::Measure => "measure",
+            Self::Bake => "bake",
             Self::Atlas => "atlas",
             Self::Write => "write",
         }

@@ -4,8 +4,10 @@ mod coordinate;
 mod material;
 mod model;
 mod piece;
+mod surface;
 
 pub use coordinate::{Coordinate, Key, PositionKey, color_key, key, texcoord_key, wide};
 pub use material::{AlphaMode, Material, TextureData, TextureSource, Wrap};
 pub use model::{Group, Model, Part, UpAxis, Warnings};
 pub use piece::Mesh;
+pub(crate) use surface::Surface;

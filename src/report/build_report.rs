@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::{UpAxis, Warnings};
+use crate::texture::BakeReason;
 use crate::{Error, Result};
 
 /// The contents of `build.json`.
@@ -35,6 +36,9 @@ pub struct BuildReport {
     pub tilesets: Vec<FileReport>,
     /// Nodes that have more triangles than their budget allows, in order of id.
     pub over_budget: Vec<OverBudget>,
+    /// Nodes with textures of their own instead of the source's charts, in order of id.
+    #[serde(default)]
+    pub baked: Vec<Baked>,
     /// What was imperfect and how often, in the order in which it was met.
     pub warnings: Vec<Count>,
 }
@@ -152,6 +156,17 @@ pub struct OverBudget {
     pub triangles: u64,
     /// Why.
     pub reason: String,
+}
+
+/// A node that was simplified across texture seams and has a texture of its own.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Baked {
+    /// [`Node::id`](crate::format::Node).
+    pub id: u64,
+    /// [`Node::file`](crate::format::Node).
+    pub file: String,
+    /// Why.
+    pub reason: BakeReason,
 }
 
 impl BuildReport {

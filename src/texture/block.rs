@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::bake::{BakeClasses, BakePlan, BakeReason, Seams, Source};
 use super::bits::BitGrid;
 use super::cache::{Decoded, TextureCache};
-use super::charts::{Charts, UvBox};
+use super::charts::{self, Charts, UvBox};
 use super::level::{self, LevelPicture, Region};
 use super::plan::{self, TextureUse};
 use super::raster::{self, Rasterizer};
@@ -22,11 +23,15 @@ pub struct TextureOptions {
     /// Longest side of an atlas, texels, 16–65535; default 4096. A leaf that needs more gets
     /// several pages, a coarser node a coarser atlas and a warning.
     pub max_atlas: u32,
+    /// Whether coarse nodes give up texture seams.
+    pub seams: Seams,
+    /// Triangles of the block's root; seams are in the way where it has few for each chart.
+    pub root_triangles: usize,
 }
 
 impl Default for TextureOptions {
     fn default() -> Self {
-        Self { jpeg_quality: 85, max_atlas: 4096 }
+        Self { jpeg_quality: 85, max_atlas: 4096, seams: Seams::Keep, root_triangles: 900 }
     }
 }
 
@@ -56,6 +61,12 @@ pub struct BlockTextures<'a> {
     pub(super) textures: Vec<Prepared>,
     /// By material of the model.
     pub(super) material_textures: Vec<Option<u32>>,
+    /// The materials that may be baked.
+    pub(super) classes: BakeClasses,
+    /// What nodes are baked from; `None` where none is.
+    pub(super) source: Option<Source>,
+    /// Why all coarse nodes are baked, where they are.
+    bake_always: Option<BakeReason>,
     used_texels: u64,
     /// Square metres of the block's triangles whose textures are cut up.
     area: f64,
@@ -160,11 +171,67 @@ impl<'a> BlockTextures<'a> {
             steps,
             textures,
             material_textures,
+            classes: BakeClasses::default(),
+            source: None,
+            bake_always: None,
             used_texels,
             area: 0.0,
         };
         block.area = block.atlas_area(mesh);
+        block.prepare_bake(mesh, &usage);
         block
+    }
+
+    /// Keeps what coarse nodes may be baked from.
+    fn prepare_bake(&mut self, mesh: &Mesh, usage: &Usage) {
+        let wanted = self.options.seams != Seams::Keep;
+        if !wanted || self.steps.len() < 2 || self.used_texels == 0 {
+            return;
+        }
+        let atlas = |material: u32| {
+            let texture = self.material_textures.get(material as usize).copied().flatten()?;
+            match self.textures.get(texture as usize)? {
+                Prepared::Atlas(source) => Some((texture, source)),
+                _ => None,
+            }
+        };
+        let classes = BakeClasses::new(&self.model.materials, |material| atlas(material).is_some());
+        if classes.is_empty() {
+            return;
+        }
+        let mut charts: Vec<u32> = mesh
+            .triangles
+            .iter()
+            .filter(|triangle| classes.of(mesh.triangle_material(**triangle)).is_some())
+            .map(|triangle| usage.charts.of_vertex[triangle[0] as usize])
+            .collect();
+        charts.sort_unstable();
+        charts.dedup();
+        let root_triangles = self.options.root_triangles;
+        let Some(always) = self.options.seams.decide(charts.len(), root_triangles) else {
+            return;
+        };
+        let source = Source::new(mesh, &classes, |triangle| {
+            let (texture, source) = atlas(mesh.triangle_material(triangle))?;
+            let chart = usage.charts.of_vertex[triangle[0] as usize];
+            let bounds = &usage.charts.boxes[chart as usize];
+            let texel = |vertex: u32| {
+                let uv = charts::sane(mesh.texcoords[vertex as usize]);
+                [0, 1].map(|axis| {
+                    (uv[axis] - source.tile(bounds, axis)) * source.size[axis] - source.origin[axis]
+                })
+            };
+            Some((texture, triangle.map(texel)))
+        });
+        self.classes = classes;
+        self.source = Some(source);
+        self.bake_always = always;
+    }
+
+    /// What coarse nodes may bake; `None` where it would not be worth it.
+    pub fn bake_plan(&self) -> Option<BakePlan<'_>> {
+        let plan = BakePlan { classes: &self.classes, always: self.bake_always };
+        self.source.as_ref().map(|_| plan)
     }
 
     /// The area of the triangles whose textures are cut up, square metres.

@@ -55,6 +55,32 @@ impl LevelPicture {
         &pixels[(y * width + x) * self.channels..][..count * self.channels]
     }
 
+    /// A picture of these bytes.
+    pub fn own(size: [usize; 2], channels: usize, step: f64, pixels: Vec<u8>) -> Self {
+        Self { size, channels, step, pixels: Pixels::Own(pixels) }
+    }
+
+    /// The colour at a position in texels by bilinear sampling, linear light, 0–1; beyond the
+    /// picture its border texels go on.
+    pub fn light_at(&self, at: [f64; 2]) -> [f32; 3] {
+        let table = srgb::to_linear();
+        let [x, y] = [0, 1].map(|axis| {
+            let low = (at[axis] - 0.5).clamp(0.0, self.size[axis] as f64 - 1.0);
+            let first = low as usize;
+            (first, (first + 1).min(self.size[axis] - 1), (low - first as f64) as f32)
+        });
+        let mut light = [0.0; 3];
+        for (row, weight) in [(y.0, 1.0 - y.2), (y.1, y.2)] {
+            for (column, weight) in [(x.0, weight * (1.0 - x.2)), (x.1, weight * x.2)] {
+                let texel = self.row(row, column, 1);
+                for channel in 0..3 {
+                    light[channel] += f32::from(table[usize::from(texel[channel])]) * weight;
+                }
+            }
+        }
+        light.map(|light| light * (1.0 / 65535.0))
+    }
+
     /// The same at half the resolution.
     pub fn halved(&self) -> Self {
         self.reduced(2.0)

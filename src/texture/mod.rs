@@ -12,6 +12,7 @@
 //! centre is less than one texel away.
 
 mod atlas;
+mod bake;
 mod bits;
 mod block;
 mod cache;
@@ -37,6 +38,7 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
+pub use bake::{BakeClasses, BakePlan, BakeReason, BakedMesh, Seams};
 pub use block::{BlockTextures, TextureOptions, texture_factors};
 pub use cache::TextureCache;
 pub use node::TexturedNode;

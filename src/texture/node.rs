@@ -6,8 +6,9 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use super::atlas::{Atlas, Page, PatchPlace, Sheet, SheetPicture};
+use super::bake::BakedMesh;
 use super::block::{BlockTextures, Prepared};
-use super::charts::{self, Charts, NO_CHART};
+use super::charts::{self, Charts, NO_CHART, UvBox};
 use super::encode;
 use super::level::LevelPicture;
 use crate::format::{NodeImage, NodeImageData, NodeMesh};
@@ -20,6 +21,10 @@ const CELL: usize = 2;
 
 /// Texels per cell of a root's atlas: nothing coarser replaces it.
 const ROOT_CELL: usize = 8;
+
+/// Texels per cell of the atlas of a root's baked charts, which are many and small there. They are
+/// of one block and mostly alike, so that what mixes beyond mip level 2 is hardly seen.
+const BAKED_CELL: usize = 4;
 
 /// A coarse node with more than this many times its share of the block's texels takes them from a
 /// level above. Simplification that joins charts leaves triangles that span what the source does
@@ -50,6 +55,9 @@ pub(super) struct Mapping {
 }
 
 impl Mapping {
+    /// Of coordinates that are texels.
+    const TEXELS: Self = Self { scale: [1.0; 2], offset: [0.0; 2], limit: [f64::INFINITY; 2] };
+
     pub(super) fn texel(&self, uv: [f32; 2]) -> [f64; 2] {
         let uv = charts::sane(uv);
         let along = |axis: usize| {
@@ -78,6 +86,9 @@ impl Place {
 /// The place of triangles without texture.
 const NO_PLACE: u32 = u32::MAX;
 
+/// The texture of charts that have a picture of their own.
+const NO_TEXTURE: u32 = u32::MAX;
+
 impl BlockTextures<'_> {
     /// The node of a simplified (or original) piece of the block at `level`, 0 being the root's.
     ///
@@ -92,12 +103,47 @@ impl BlockTextures<'_> {
         level: usize,
         origin: [f64; 3],
     ) -> Result<TexturedNode> {
-        let level = level.min(self.steps.len().saturating_sub(1));
-        let mut node = NodeBuilder::new(self, mesh, level);
+        self.textured(NodeBuilder::new(self, mesh, self.nearest_level(level)), alike, origin)
+    }
+
+    /// The same of a baked mesh.
+    pub fn baked_node_mesh(
+        &self,
+        baked: &BakedMesh,
+        alike: &[[u32; 2]],
+        level: usize,
+        origin: [f64; 3],
+    ) -> Result<TexturedNode> {
+        let mut node = NodeBuilder::new(self, &baked.mesh, self.nearest_level(level));
+        node.baked = Some(baked);
+        self.textured(node, alike, origin)
+    }
+
+    pub(super) fn nearest_level(&self, level: usize) -> usize {
+        level.min(self.steps.len().saturating_sub(1))
+    }
+
+    /// Texels a cell of the atlas of a node's baked charts.
+    pub(super) fn baked_cell(&self, level: usize) -> usize {
+        self.cell(level).min(BAKED_CELL)
+    }
+
+    /// Texels a cell of a node's atlas.
+    fn cell(&self, level: usize) -> usize {
+        if level == 0 && self.steps[level] > 1.0 { ROOT_CELL } else { CELL }
+    }
+
+    fn textured(
+        &self,
+        mut node: NodeBuilder,
+        alike: &[[u32; 2]],
+        origin: [f64; 3],
+    ) -> Result<TexturedNode> {
         node.find_charts(alike);
         for channels in [3, 4] {
             node.build_atlas(channels)?;
         }
+        node.add_baked(alike)?;
         node.find_shared()?;
         let primitives = node.primitives();
         let own_texels = node
@@ -114,6 +160,8 @@ impl BlockTextures<'_> {
 pub(super) struct NodeBuilder<'a> {
     pub(super) block: &'a BlockTextures<'a>,
     pub(super) mesh: &'a Mesh,
+    /// Where it is, the triangles of its charts take their texels from it.
+    baked: Option<&'a BakedMesh>,
     pub(super) level: usize,
     pub(super) charts: Charts,
     /// By chart.
@@ -134,6 +182,7 @@ impl<'a> NodeBuilder<'a> {
         Self {
             block,
             mesh,
+            baked: None,
             level,
             charts: Charts::default(),
             chart_textures: Vec::new(),
@@ -159,8 +208,10 @@ impl<'a> NodeBuilder<'a> {
         if self.mesh.texcoords.len() != self.mesh.positions.len() {
             return;
         }
+        let is_baked =
+            |material: u32| self.baked.is_some() && self.block.classes.of(material).is_some();
         let textured: Vec<bool> = (0..self.block.material_textures.len() as u32)
-            .map(|material| self.texture_of(material).is_some())
+            .map(|material| self.texture_of(material).is_some() && !is_baked(material))
             .collect();
         if !textured.contains(&true) {
             return;
@@ -191,12 +242,78 @@ impl<'a> NodeBuilder<'a> {
         (chart != NO_CHART).then_some(chart as usize)
     }
 
+    /// Makes the atlas of the charts that a baked mesh has of its own.
+    fn add_baked(&mut self, alike: &[[u32; 2]]) -> Result<()> {
+        let Some(baked) = self.baked.filter(|baked| !baked.pictures.is_empty()) else {
+            return Ok(());
+        };
+        let first = self.charts.boxes.len() as u32;
+        self.charts.of_vertex.resize(self.mesh.positions.len(), NO_CHART);
+        for (of_vertex, chart) in self.charts.of_vertex.iter_mut().zip(&baked.charts) {
+            if let Some(chart) = chart {
+                *of_vertex = first + chart;
+            }
+        }
+        // Skirts look like the vertices that they hang on.
+        for &[model, copy] in alike {
+            self.charts.of_vertex[copy as usize] = self.charts.of_vertex[model as usize];
+        }
+        self.charts.boxes.resize(first as usize + baked.pictures.len(), UvBox::EMPTY);
+        self.chart_textures.resize(self.charts.boxes.len(), NO_TEXTURE);
+        self.mappings.resize(self.charts.boxes.len(), None);
+        let mut pictures: Vec<Cow<LevelPicture>> =
+            baked.pictures.iter().map(Cow::Borrowed).collect();
+        let mut mapping = Mapping::TEXELS;
+        loop {
+            let (sheet_pictures, members) = self.baked_pictures(first, &pictures, mapping);
+            let cell = self.block.baked_cell(self.level);
+            let sheet = Sheet { pictures: sheet_pictures, cell, max_side: self.max_side() };
+            if let Some(atlas) = sheet.build(1) {
+                let mut mappings = vec![None; first as usize];
+                mappings.resize(self.charts.boxes.len(), Some(mapping));
+                return self.take_atlas(&atlas, &mappings, &members, 3);
+            }
+            if pictures.iter().all(|picture| picture.size == [1, 1]) {
+                let side = self.max_side();
+                return Err(Error::Internal(format!("no atlas of {side} texels a side")));
+            }
+            pictures = pictures.iter().map(|picture| Cow::Owned(picture.halved())).collect();
+            mapping.scale = mapping.scale.map(|scale| scale * 0.5);
+        }
+    }
+
+    /// The charts from `first` on as a sheet's pictures, and which triangles of the mesh those are.
+    fn baked_pictures<'p>(
+        &self,
+        first: u32,
+        pictures: &'p [Cow<LevelPicture>],
+        mapping: Mapping,
+    ) -> (Vec<SheetPicture<'p>>, Vec<Vec<u32>>) {
+        let empty = |picture: &'p Cow<LevelPicture>| SheetPicture {
+            picture,
+            corners: Vec::new(),
+            charts: Vec::new(),
+        };
+        let mut lists: Vec<SheetPicture> = pictures.iter().map(empty).collect();
+        let mut members = vec![Vec::new(); pictures.len()];
+        for (index, triangle) in self.mesh.triangles.iter().enumerate() {
+            let chart =
+                self.chart_of(*triangle).and_then(|chart| chart.checked_sub(first as usize));
+            let Some(chart) = chart else { continue };
+            let texel = |vertex: u32| mapping.texel(self.mesh.texcoords[vertex as usize]);
+            lists[chart].corners.push(triangle.map(texel));
+            lists[chart].charts.push(0);
+            members[chart].push(index as u32);
+        }
+        (lists, members)
+    }
+
     /// Makes the atlas of all cut-up textures with this many channels.
     fn build_atlas(&mut self, channels: usize) -> Result<()> {
         // By texture: its place among the sheet's pictures.
         let mut pictures: BTreeMap<u32, usize> = BTreeMap::new();
         for texture in &self.chart_textures {
-            if let Prepared::Atlas(source) = &self.block.textures[*texture as usize]
+            if let Some(Prepared::Atlas(source)) = self.block.textures.get(*texture as usize)
                 && source.channels == channels
             {
                 pictures.insert(*texture, 0);
@@ -209,7 +326,7 @@ impl<'a> NodeBuilder<'a> {
             *index = place;
         }
         let is_leaf = self.block.steps[self.level] <= 1.0;
-        let max_side = (self.block.options.max_atlas as usize).clamp(16, encode::MAX_SIDE) / 4 * 4;
+        let max_side = self.max_side();
         let mut coarser: Vec<Cow<'a, LevelPicture>> = Vec::new();
         let mut halvings = 0;
         let mut fitted = false;
@@ -221,11 +338,8 @@ impl<'a> NodeBuilder<'a> {
             };
             let mappings = self.texel_mappings(&pictures, &levels);
             let (sheet_pictures, members) = self.sheet_pictures(&pictures, &levels, &mappings);
-            let sheet = Sheet {
-                pictures: sheet_pictures,
-                cell: if self.level == 0 && !is_leaf { ROOT_CELL } else { CELL },
-                max_side,
-            };
+            let sheet =
+                Sheet { pictures: sheet_pictures, cell: self.block.cell(self.level), max_side };
             let max_pages = if is_leaf && halvings == 0 { usize::MAX } else { 1 };
             if let Some(atlas) = sheet.build(max_pages) {
                 if !is_leaf && !fitted && halvings == 0 && self.exceeds_share(&atlas) {
@@ -255,6 +369,11 @@ impl<'a> NodeBuilder<'a> {
             );
         }
         Ok(())
+    }
+
+    /// Longest side of a page.
+    fn max_side(&self) -> usize {
+        (self.block.options.max_atlas as usize).clamp(16, encode::MAX_SIDE) / 4 * 4
     }
 
     /// True where an atlas has far more texels than the node's part of the block's surface.
@@ -380,7 +499,8 @@ impl<'a> NodeBuilder<'a> {
         for (index, triangle) in self.mesh.triangles.iter().enumerate() {
             let Some(chart) = self.chart_of(*triangle) else { continue };
             let texture = self.chart_textures[chart];
-            let Prepared::Repeating(decoded) = &self.block.textures[texture as usize] else {
+            let Some(Prepared::Repeating(decoded)) = self.block.textures.get(texture as usize)
+            else {
                 continue;
             };
             let material = self.mesh.triangle_material(*triangle);

@@ -304,7 +304,8 @@ fn decode(mesh: &NodeMesh, image: usize) -> Page {
     Page { size, pixels: picture.into_raw() }
 }
 
-const FINEST: TextureOptions = TextureOptions { jpeg_quality: 100, max_atlas: 4096 };
+const FINEST: TextureOptions =
+    TextureOptions { jpeg_quality: 100, max_atlas: 4096, seams: Seams::Keep, root_triangles: 900 };
 
 /// A picture that JPEG keeps well.
 fn smooth(width: u32, height: u32) -> Picture {

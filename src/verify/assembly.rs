@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::geometry::NodeGeometry;
-use super::surface::Surface;
+use crate::mesh::Surface;
 
 /// Nodes joined; triangles in cutting planes are left out.
 pub(super) struct Assembly {

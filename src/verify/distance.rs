@@ -15,10 +15,10 @@ use super::points::Points;
 use super::progress::Progress;
 use super::report::Distance;
 use super::sample::spread;
-use super::surface::Surface;
 use super::tally::Tally;
 use super::tree::is_leaf;
 use crate::format::Scene;
+use crate::mesh::Surface;
 
 /// A node of a front and its distances.
 #[derive(Clone, Copy, Debug)]

@@ -27,9 +27,9 @@ use super::options::Limits;
 use super::progress::Progress;
 use super::report::{Check, Failure, GapFigures};
 use super::seams::{Seam, rim};
-use super::surface::Surface;
 use super::tree::{apart, input_of, is_leaf, line};
 use crate::format::Scene;
+use crate::mesh::Surface;
 
 /// Where along an edge of the seam is looked.
 const PLACES: [f64; 3] = [0.0, 0.5, 1.0];

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::surface::Surface;
+use crate::mesh::Surface;
 
 /// Segments with a search tree: triangles two of whose corners are one.
 pub(super) struct Lines(Surface);

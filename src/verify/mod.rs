@@ -40,7 +40,6 @@ mod source;
 mod source_colors;
 mod step;
 mod structure;
-mod surface;
 mod tally;
 mod text;
 mod tiles;

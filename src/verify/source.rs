@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::look::Look;
 use super::progress::Progress;
 use super::seams::open_edges;
-use super::surface::Surface;
 use crate::import::{find_inputs, load};
+use crate::mesh::Surface;
 use crate::mesh::{Model, TextureSource};
 use crate::{Error, Result};
 

@@ -156,8 +156,14 @@ impl NodeSink for MemorySink {
 pub fn build(piece: Piece, lattice: Lattice, options: &HierarchyOptions) -> Vec<Kept> {
     let sink = MemorySink::default();
     let factors = simplifications(piece.mesh.triangles.len(), options);
-    let builder =
-        BlockBuilder { options, factors, lattice, sink: &sink, stages: &Default::default() };
+    let builder = BlockBuilder {
+        options,
+        factors,
+        bake: None,
+        lattice,
+        sink: &sink,
+        stages: &Default::default(),
+    };
     let _tree: Tree<()> = builder.build(piece).unwrap();
     let mut nodes = sink.0.into_inner().unwrap();
     nodes.sort_by(|a, b| (a.level, &a.place).cmp(&(b.level, &b.place)));

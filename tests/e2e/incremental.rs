@@ -234,6 +234,7 @@ fn the_report_covers_what_was_taken_over() {
         "levels",
         "outcomes",
         "over_budget",
+        "baked",
         "warnings",
     ] {
         assert_eq!(partly[part], whole[part], "{part}");

@@ -13,6 +13,7 @@ mod incremental;
 mod output;
 mod paths;
 mod real_data;
+mod seams;
 mod soups;
 mod tileset;
 mod verify;

@@ -22,10 +22,16 @@ const BOX_SLACK: f64 = 4.0 / (1 << 23) as f64;
 const SQUARE: f64 = 8192.0;
 
 /// A triangle mesh that can be asked for its closest point.
-pub(super) struct Surface {
+pub(crate) struct Surface {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     squares: Vec<Square>,
+}
+
+impl std::fmt::Debug for Surface {
+    fn fmt(&self, out: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(out, "Surface of {} triangles", self.triangles.len())
+    }
 }
 
 /// The triangles whose first corner lies in one square.
@@ -40,7 +46,7 @@ struct Square {
 
 /// A point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Hit {
+pub(crate) struct Hit {
     /// The triangle's number.
     pub triangle: u32,
     /// Weights of its corners.
@@ -91,15 +97,35 @@ impl Surface {
 
     /// The point nearest to `point`; `None` where there is no triangle.
     pub fn closest(&self, point: DVec3) -> Option<Hit> {
-        let mut best: Option<Hit> = None;
-        self.search(point, f64::INFINITY, |hit, reach| {
+        self.closest_of(point, None, |_| 1.0)
+    }
+
+    /// The point nearest to `point` where the distance of a triangle counts `weight` times, which
+    /// is at least 1; `None` where there is no triangle. The search begins with triangle `first`.
+    pub fn closest_of(
+        &self,
+        point: DVec3,
+        first: Option<u32>,
+        weight: impl Fn(u32) -> f64,
+    ) -> Option<Hit> {
+        let weighted = |hit: &Hit| hit.squared * weight(hit.triangle).powi(2);
+        let first = first.map(|triangle| hit(point, triangle, self.corners(triangle)));
+        let mut best = first.map(|hit| (weighted(&hit), hit));
+        let reach = best.map_or(f64::INFINITY, |(squared, _)| squared.sqrt());
+        self.search(point, reach, |hit, reach| {
+            let squared = weighted(&hit);
             // Of triangles that are equally near the first is taken, whatever the tree looks like.
-            if best.is_none_or(|best| (hit.squared, hit.triangle) < (best.squared, best.triangle)) {
-                *reach = hit.distance();
-                best = Some(hit);
+            if best.is_none_or(|(least, best)| (squared, hit.triangle) < (least, best.triangle)) {
+                *reach = squared.sqrt();
+                best = Some((squared, hit));
             }
         });
-        best
+        best.map(|(_, hit)| hit)
+    }
+
+    /// The point of one triangle that is nearest to `point`.
+    pub fn on_triangle(&self, point: DVec3, triangle: u32) -> Hit {
+        hit(point, triangle, self.corners(triangle))
     }
 
     /// The distance from `point`; infinite where there is no triangle.
@@ -151,6 +177,7 @@ impl Square {
             .map(|&number| Aabb::from_points(&corners(number).map(|p| (p - centre).as_vec3a())))
             .collect();
         let bvh = build_bvh2(&boxes, BvhBuildParams::very_fast_build(), &mut Default::default());
+
         Self { bvh, members, low, high, slack: (high - low).max_element() * BOX_SLACK }
     }
 
@@ -168,12 +195,15 @@ impl Square {
         let nodes = &self.bvh.nodes;
         let to_box = |node: u32| {
             let bounds = nodes[node as usize].aabb;
-            f64::from((local - local.clamp(bounds.min, bounds.max)).length())
+            (local - local.clamp(bounds.min, bounds.max)).length_squared()
         };
-        let mut stack: Vec<(f64, u32)> = Vec::with_capacity(96);
+        // Squares, and a last bit more.
+        let limit = |reach: f64| ((reach + slack).powi(2) * (1.0 + 1e-6)) as f32;
+        let mut most = limit(*reach);
+        let mut stack: Vec<(f32, u32)> = Vec::with_capacity(96);
         stack.push((to_box(0), 0));
         while let Some((distance, number)) = stack.pop() {
-            if distance > *reach + slack {
+            if distance > most {
                 continue;
             }
             let node = &nodes[number as usize];
@@ -184,12 +214,17 @@ impl Square {
                     let triangle = self.members[member as usize];
                     visit(hit(point, triangle, surface.corners(triangle)), reach);
                 }
+                most = limit(*reach);
             } else {
                 let (left, right) = (node.first_index, node.first_index + 1);
                 let (near, far) = ((to_box(left), left), (to_box(right), right));
                 let (near, far) = if near.0 <= far.0 { (near, far) } else { (far, near) };
-                stack.push(far);
-                stack.push(near);
+                if far.0 <= most {
+                    stack.push(far);
+                }
+                if near.0 <= most {
+                    stack.push(near);
+                }
             }
         }
     }

@@ -1,0 +1,89 @@
+//! Which blocks are baked.
+
+use serde::{Deserialize, Serialize};
+
+use super::classes::BakeClasses;
+
+/// What happens to texture seams in coarse nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Seams {
+    /// Simplification works around them.
+    Keep,
+    /// They are given up where they are in the way: see [`BakeReason`].
+    #[default]
+    Auto,
+    /// They are given up in every coarse node.
+    Bake,
+}
+
+/// Why a node was given a texture of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BakeReason {
+    /// It was asked for.
+    Asked,
+    /// Its block's texture is in so many charts that the root has few triangles for each.
+    Torn,
+    /// Collapse within the seams leaves more triangles than the node may have.
+    Seams,
+    /// A node below it has one.
+    Below,
+}
+
+impl BakeReason {
+    /// For reports.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Asked => "texture baked, as asked for",
+            Self::Torn => "texture baked, as its block's is in many small charts",
+            Self::Seams => "texture baked, as seams kept the node from its triangle budget",
+            Self::Below => "texture baked, as a node below has one that is",
+        }
+    }
+}
+
+/// A block whose root has fewer triangles than this for each chart is torn: seams then shape its
+/// coarse nodes more than the surface does, and gutters take much of their atlases. Scans have 2 to
+/// 10, generated façades and roofs more than 100.
+const TORN: usize = 16;
+
+/// With fewer than this, seams may keep single nodes from their budget.
+const DOUBTFUL: usize = 64;
+
+/// What may be baked in a block.
+#[derive(Clone, Copy, Debug)]
+pub struct BakePlan<'a> {
+    /// The materials that it may be done to.
+    pub classes: &'a BakeClasses,
+    /// Why it is to be done to every coarse node; `None` where only to those that need it.
+    pub always: Option<BakeReason>,
+}
+
+impl Seams {
+    /// Whether a block of so many charts whose root may have so many triangles keeps what it needs
+    /// for baking, and why all of it is baked at once.
+    pub(crate) fn decide(self, charts: usize, triangles: usize) -> Option<Option<BakeReason>> {
+        match self {
+            Self::Keep => None,
+            Self::Bake => Some(Some(BakeReason::Asked)),
+            Self::Auto if charts * TORN > triangles => Some(Some(BakeReason::Torn)),
+            Self::Auto if charts * DOUBTFUL > triangles => Some(None),
+            Self::Auto => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_judged_by_the_triangles_that_their_root_has_for_a_chart() {
+        assert_eq!(Seams::Auto.decide(373, 900), Some(Some(BakeReason::Torn)));
+        assert_eq!(Seams::Auto.decide(30, 900), Some(None));
+        assert_eq!(Seams::Auto.decide(7, 900), None);
+        assert_eq!(Seams::Keep.decide(373, 900), None);
+        assert_eq!(Seams::Bake.decide(1, 900), Some(Some(BakeReason::Asked)));
+    }
+}
