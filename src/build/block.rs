@@ -182,6 +182,7 @@ pub fn build_input(
             factors,
             bake: textures.bake_plan(),
             lattice,
+            up,
             sink: &sink,
             stages,
         };

@@ -22,7 +22,7 @@ use super::skirt::{Skirt, skirts, triangles_of};
 use super::stages::{Stage, Stages};
 use super::thin_border::thin_border;
 use crate::Result;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, UpAxis};
 use crate::texture::{BakePlan, BakeReason, Seams};
 
 /// What a coarse node is simplified from.
@@ -165,6 +165,8 @@ pub struct BlockBuilder<'a, S> {
     pub bake: Option<BakePlan<'a>>,
     /// The block's lattice.
     pub lattice: Lattice,
+    /// Which axis points at the sky.
+    pub up: UpAxis,
     /// Where nodes go.
     pub sink: &'a S,
     /// Where the time goes.
@@ -438,7 +440,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
         let HierarchyOptions { simplifier, weights, .. } = *self.options;
         let weights = AppearanceWeights { keep_folds, ..weights };
-        let mut result = simplify(&mesh, &border, path, at, target, simplifier, weights);
+        let mut result = simplify(&mesh, &border, path, at, target, self.up, simplifier, weights);
         if result.mesh.triangles.is_empty() {
             result = remnant(source, &border, LEAST_TRIANGLES.min(target));
         }

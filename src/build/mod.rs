@@ -1,5 +1,6 @@
 //! From imported models to nodes on disk: blocks, cutting planes, simplification, attributes.
 
+mod aggregate;
 pub mod attributes;
 pub mod block;
 pub mod blocks;

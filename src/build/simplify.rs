@@ -9,6 +9,9 @@
 //!    - the same, also leaving out the smallest separate parts;
 //!    - vertex clustering ([`super::cluster`]), which has no topology to respect.
 //!
+//! Where the mesh is many separate bodies and the budget leaves few triangles to each, boxes for
+//! them ([`super::aggregate`]) are tried against what the ladder gave, by the same measure.
+//!
 //! Border vertices that the level keeps are locked throughout.
 
 use std::cmp::Ordering;
@@ -16,12 +19,13 @@ use std::cmp::Ordering;
 use meshopt::{SimplifyOptions, SimplifyVertex};
 use rustc_hash::FxHashMap;
 
+use super::aggregate::{Aggregated, aggregate};
 use super::border::{Border, Fate, Path};
 use super::cluster::cluster;
 use super::compact::compact;
 use super::distance::mean_distance;
 use super::mend_materials::mend_materials;
-use crate::mesh::{Mesh, PositionKey, key};
+use crate::mesh::{Mesh, PositionKey, UpAxis, key};
 
 /// Which method makes the coarse levels.
 #[derive(
@@ -52,6 +56,8 @@ pub enum LadderStep {
     Prune,
     /// Vertex clustering.
     Clustering,
+    /// Boxes in place of small separate bodies, and edge collapse of the rest.
+    Boxes,
     /// The largest triangles alone, where simplification would leave nothing.
     Remnant,
 }
@@ -66,6 +72,7 @@ impl LadderStep {
             Self::Across => "edge collapse across material borders",
             Self::Prune => "edge collapse without the smallest separate parts",
             Self::Clustering => "vertex clustering",
+            Self::Boxes => "boxes for small separate bodies",
             Self::Remnant => "the largest triangles alone",
         }
     }
@@ -114,6 +121,7 @@ pub fn simplify(
     path: &Path,
     level: u8,
     target: usize,
+    up: UpAxis,
     simplifier: Simplifier,
     weights: AppearanceWeights,
 ) -> Simplified {
@@ -133,6 +141,7 @@ pub fn simplify(
         return source;
     }
     let collapsed = |step| collapse(&source.mesh, &source.border, &locked, target, step, weights);
+    let boxes = boxes(&source, &locked, up, target, weights);
     let mut best = collapsed(LadderStep::Collapse);
     if best.mesh.triangles.len() > limit {
         let permissive = collapsed(LadderStep::Permissive);
@@ -140,14 +149,16 @@ pub fn simplify(
             best = permissive;
         }
     }
-    if best.mesh.triangles.len() <= limit {
+    let mut candidates = Vec::new();
+    if best.mesh.triangles.len() > limit {
+        candidates.push(collapsed(LadderStep::Across));
+        candidates.push(collapsed(LadderStep::Prune));
+        candidates.push(clustered(&source.mesh, &source.border, &locked, target));
+    }
+    candidates.extend(boxes);
+    if candidates.is_empty() {
         return best;
     }
-    let candidates = [
-        collapsed(LadderStep::Across),
-        collapsed(LadderStep::Prune),
-        clustered(&source.mesh, &source.border, &locked, target),
-    ];
     // Within the budget and nearest to the input; else the fewest triangles.
     let rank = |candidate: &Simplified| {
         let triangles = candidate.mesh.triangles.len();
@@ -166,6 +177,35 @@ pub fn simplify(
         }
     }
     best.1
+}
+
+/// Boxes for small bodies, and the rest collapsed; `None` where there are too few bodies.
+fn boxes(
+    source: &Simplified,
+    locked: &[bool],
+    up: UpAxis,
+    target: usize,
+    weights: AppearanceWeights,
+) -> Option<Simplified> {
+    let Aggregated { boxes, rest } = aggregate(&source.mesh, locked, up, target)?;
+    let for_rest = target.saturating_sub(boxes.triangles.len()).max(1);
+    let rest = Mesh { triangles: rest, ..source.mesh.clone() };
+    let mut result = if rest.triangles.len() > for_rest {
+        // Nothing is left out here: that is for small bodies, which are boxes.
+        collapse(&rest, &source.border, locked, for_rest, LadderStep::Across, weights)
+    } else {
+        let (mesh, border) = compact(&rest, &source.border);
+        Simplified { mesh, border, error: 0.0, step: LadderStep::Collapse }
+    };
+    result.step = LadderStep::Boxes;
+    let first = result.mesh.positions.len() as u32;
+    result.mesh.triangles.extend(boxes.triangles.iter().map(|t| t.map(|vertex| first + vertex)));
+    result.border.planes.resize(result.border.planes.len() + boxes.positions.len(), 0);
+    result.border.keep.resize(result.border.keep.len() + boxes.positions.len(), 0);
+    result.mesh.positions.extend(boxes.positions);
+    result.mesh.colors.extend(boxes.colors);
+    result.mesh.materials.extend(boxes.materials);
+    Some(result)
 }
 
 fn clustered(mesh: &Mesh, border: &Border, locked: &[bool], target: usize) -> Simplified {

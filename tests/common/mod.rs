@@ -161,6 +161,7 @@ pub fn build(piece: Piece, lattice: Lattice, options: &HierarchyOptions) -> Vec<
         factors,
         bake: None,
         lattice,
+        up: hlod::mesh::UpAxis::Z,
         sink: &sink,
         stages: &Default::default(),
     };

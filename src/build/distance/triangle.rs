@@ -72,9 +72,11 @@ impl Triangle {
         let [apex_x, apex_y] = self.apex;
         // From the end of the longest side.
         let (x_end, apex_x_end) = (x - self.length, apex_x - self.length);
+        // `clamp` would panic where coordinates overflow and the length is no number.
+        #[allow(clippy::manual_clamp)]
         let to_longest = (x - x.max(0.0).min(self.length)).powi(2) + y * y;
         let to_side = |x: f32, apex_x: f32, per_squared: f32| {
-            let share = ((x * apex_x + y * apex_y) * per_squared).max(0.0).min(1.0);
+            let share = ((x * apex_x + y * apex_y) * per_squared).clamp(0.0, 1.0);
             (x - share * apex_x).powi(2) + (y - share * apex_y).powi(2)
         };
         let to_sides = to_side(x, apex_x, self.per_squared[0]).min(to_side(

@@ -1,0 +1,137 @@
+//! Boxes in place of many small separate bodies.
+//!
+//! Edge collapse never joins parts that do not touch. Where a node may spend but a few triangles on
+//! each of hundreds of buildings, most fall to slivers or go, and with them the volume and the
+//! skyline that a city has from afar. Here each small closed body becomes a box over its footprint,
+//! as high as its roof is on average, and boxes are joined with a neighbour or left out, always what
+//! changes least of what is seen from above and from the sides, until there are as few as asked.
+//!
+//! Bodies with triangles enough for edge collapse, those that go on beyond a border, and what is no
+//! body (the ground, roads, fences) stay as they are.
+
+mod bodies;
+mod frame;
+mod joining;
+mod solid;
+
+use self::bodies::{Part, parts};
+use self::frame::Frame;
+use self::joining::join_down_to;
+use self::solid::Solid;
+use crate::mesh::{Mesh, UpAxis};
+
+/// A body whose share of the budget, by its surface, is at least this many triangles keeps its form.
+const ENOUGH_TRIANGLES: f64 = 24.0;
+
+/// Boxes pay where the budget leaves fewer triangles than this to a body.
+const TRIANGLES_PER_BODY: usize = 12;
+
+/// A mesh whose small bodies are boxes.
+pub struct Aggregated {
+    /// The boxes.
+    pub boxes: Mesh,
+    /// The triangles of the mesh that are in none.
+    pub rest: Vec<[u32; 3]>,
+}
+
+/// Replaces the small bodies of an untextured `mesh` by boxes, so that some `target` triangles are
+/// left for all if the rest is simplified too; `None` where there are too few to be worth it.
+/// Nothing that has a `locked` vertex is replaced.
+pub fn aggregate(mesh: &Mesh, locked: &[bool], up: UpAxis, target: usize) -> Option<Aggregated> {
+    if !mesh.texcoords.is_empty() {
+        return None;
+    }
+    let frame = Frame::of(up);
+    let parts = parts(mesh);
+    if parts.len() * TRIANGLES_PER_BODY <= target {
+        return None;
+    }
+    let area: f64 = parts.iter().map(|part| part.area).sum();
+    let share = |part_area: f64| target as f64 * part_area / area;
+    let (mut solids, mut boxed_area, mut rest) = (Vec::new(), 0.0, Vec::new());
+    for part in parts {
+        let is_free = || !part.triangles.iter().flatten().any(|&vertex| locked[vertex as usize]);
+        let solid = (share(part.area) < ENOUGH_TRIANGLES && is_free())
+            .then(|| Solid::of(mesh, &part.triangles, frame))
+            .flatten();
+        match solid {
+            Some(solid) => {
+                boxed_area += part.area;
+                solids.push(solid);
+            }
+            None => rest.push(part),
+        }
+    }
+    if solids.len() * TRIANGLES_PER_BODY <= target / 2 {
+        return None;
+    }
+    // What the rest does not need is there for boxes.
+    let rest: Vec<[u32; 3]> =
+        rest.into_iter().flat_map(|Part { triangles, .. }| triangles).collect();
+    let for_boxes = share(boxed_area).max(target as f64 - rest.len() as f64);
+    let most = (for_boxes / solid::TRIANGLES as f64) as usize;
+    join_down_to(&mut solids, most.max(1));
+    let mut boxes = Mesh::default();
+    for solid in &solids {
+        solid.add_to(&mut boxes, mesh, frame);
+    }
+    Some(Aggregated { boxes, rest })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hundred gabled houses of 14 triangles, on a street grid, and one sheet of ground.
+    fn town() -> Mesh {
+        let mut mesh = Mesh::default();
+        for house in 0..100u8 {
+            let (x, y) = (f32::from(house % 10) * 14.0, f32::from(house / 10) * 22.0);
+            let first = mesh.positions.len() as u32;
+            for height in [0.0, 5.0] {
+                let corner = |[i, j]: [f32; 2]| [x + 8.0 * i, y + 10.0 * j, height];
+                mesh.positions.extend([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(corner));
+            }
+            mesh.positions.extend([[x + 4.0, y, 8.0], [x + 4.0, y + 10.0, 8.0]]);
+            let walls = [(0, 1), (1, 2), (2, 3), (3, 0)];
+            for (i, j) in walls {
+                mesh.triangles
+                    .extend([[i, j, j + 4], [i, j + 4, i + 4]].map(|t| t.map(|v| v + first)));
+            }
+            let roof = [[4, 5, 8], [7, 9, 6], [4, 8, 9], [4, 9, 7], [8, 5, 6], [8, 6, 9]];
+            mesh.triangles.extend(roof.map(|t| t.map(|v| v + first)));
+        }
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([[-9.0, -9.0, -0.5], [150.0, -9.0, -0.5], [150.0, 230.0, -0.5]]);
+        mesh.triangles.push([first, first + 1, first + 2]);
+        mesh.materials = vec![0; mesh.positions.len()];
+        mesh
+    }
+
+    #[test]
+    fn a_town_becomes_boxes_and_keeps_its_ground_and_what_is_locked() {
+        let mesh = town();
+        let free = vec![false; mesh.positions.len()];
+        let Aggregated { boxes, rest } = aggregate(&mesh, &free, UpAxis::Z, 300).unwrap();
+        assert_eq!(rest.len(), 1, "the ground");
+        let count = boxes.triangles.len();
+        assert!((200..=300).contains(&count) && count.is_multiple_of(solid::TRIANGLES), "{count}");
+        // Walls of 5 m under gables: 6.5 m on average.
+        let heights = boxes.positions.iter().map(|p| p[2]).filter(|&height| height > 0.1);
+        for height in heights {
+            assert!((height - 6.5).abs() < 0.1, "{height}");
+        }
+        let mut locked = free;
+        locked[0] = true;
+        let kept = aggregate(&mesh, &locked, UpAxis::Z, 300).unwrap().rest;
+        assert_eq!(kept.len(), 1 + 14);
+        assert!(kept.iter().flatten().any(|&vertex| vertex == 0));
+    }
+
+    #[test]
+    fn nothing_is_replaced_where_the_budget_does_for_all() {
+        let mesh = town();
+        let free = vec![false; mesh.positions.len()];
+        assert!(aggregate(&mesh, &free, UpAxis::Z, 1300).is_none());
+    }
+}
