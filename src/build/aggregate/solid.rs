@@ -123,8 +123,9 @@ impl Solid {
         let footprint = sums.footprint.min(4.0 * around.x * around.y);
         let solid = Self { centre, around, footprint, axis, low, high, roof, wall };
         let walls = 4.0 * solid.half().element_sum() * (high - low);
-        let is_body =
-            high - low > LEAST_HEIGHT * footprint.sqrt() && sums.wall.area >= LEAST_WALLS * walls;
+        let is_body = high - low > LEAST_HEIGHT * footprint.sqrt()
+            && sums.wall.area >= LEAST_WALLS * walls
+            && sums.rise_heights - sums.rise * low >= LEAST_VOLUME * footprint * (high - low);
         is_body.then_some(solid)
     }
 
