@@ -10,7 +10,7 @@
 //!    - vertex clustering ([`super::cluster`]), which has no topology to respect.
 //!
 //! Where the mesh is many separate bodies and the budget leaves few triangles to each, boxes for
-//! them ([`super::aggregate`]) are tried against what the ladder gave, by the same measure.
+//! them (`super::aggregate`) are tried against what the ladder gave, by the same measure.
 //!
 //! Border vertices that the level keeps are locked throughout.
 

@@ -4,7 +4,7 @@
 //! children's meshes, summed down to the leaves, bound the distance to the original.
 //!
 //! It is measured at all vertices of both meshes, and on sides and triangles wherever what is
-//! known does not exclude that some point there is more than twice as far ([`farthest`]):
+//! known does not exclude that some point there is more than twice as far (`farthest`):
 //! [`ALLOWANCE`] then makes the result a bound. Where a surface comes back so exactly, or so bent,
 //! that this would take too many divisions, what is left is covered by likelihood alone.
 
