@@ -102,6 +102,13 @@ impl DraftSource {
     }
 }
 
+/// Whether charts of their own fit into the atlases of nodes: each takes cells of up to 8 by 8
+/// texels, and a node has hardly more charts than triangles.
+fn has_room_for_charts(options: &BuildOptions) -> bool {
+    let cells = (u64::from(options.max_atlas) / 8).pow(2);
+    cells >= 4 * u64::from(options.hierarchy.desired_tris).max(1000)
+}
+
 /// Builds all blocks of a model and writes their nodes.
 pub fn build_input(
     mut model: Model,
@@ -180,7 +187,7 @@ pub fn build_input(
         let builder = BlockBuilder {
             options: &options.hierarchy,
             factors,
-            bake: textures.bake_plan(),
+            bake: textures.bake_plan().filter(|_| has_room_for_charts(options)),
             lattice,
             up,
             sink: &sink,

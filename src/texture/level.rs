@@ -81,18 +81,6 @@ impl LevelPicture {
         light.map(|light| light * (1.0 / 65535.0))
     }
 
-    /// A single texel: the mean of as many pictures of one each, all with the same channels.
-    pub fn mean_of_texels<'a>(texels: impl ExactSizeIterator<Item = &'a Self>) -> Option<Self> {
-        let count = texels.len();
-        let mut row = None;
-        for texel in texels {
-            let row = row.get_or_insert_with(|| (texel.channels, texel.step, Vec::new()));
-            row.2.extend_from_slice(texel.row(0, 0, 1));
-        }
-        let (channels, step, pixels) = row?;
-        Some(Self::own([count, 1], channels, step, pixels).reduced(count as f64))
-    }
-
     /// The same at half the resolution.
     pub fn halved(&self) -> Self {
         self.reduced(2.0)

@@ -274,23 +274,15 @@ impl<'a> NodeBuilder<'a> {
                 return self.take_atlas(&atlas, &mappings, &members, 3);
             }
             if pictures.iter().all(|picture| picture.size == [1, 1]) {
-                // More charts than the atlas has cells: one colour for all.
-                let texels = pictures.iter().map(|picture| &**picture);
-                match LevelPicture::mean_of_texels(texels) {
-                    Some(mean) if pictures.len() > 1 => pictures = vec![Cow::Owned(mean)],
-                    _ => {
-                        let side = self.max_side();
-                        return Err(Error::Internal(format!("no atlas of {side} texels a side")));
-                    }
-                }
-                continue;
+                let side = self.max_side();
+                return Err(Error::Internal(format!("no atlas of {side} texels a side")));
             }
             pictures = pictures.iter().map(|picture| Cow::Owned(picture.halved())).collect();
             mapping.scale = mapping.scale.map(|scale| scale * 0.5);
         }
     }
 
-    /// The charts from `first` on as a sheet's pictures, or all as its only one, and which triangles of the mesh those are.
+    /// The charts from `first` on as a sheet's pictures, and which triangles of the mesh those are.
     fn baked_pictures<'p>(
         &self,
         first: u32,
@@ -308,7 +300,6 @@ impl<'a> NodeBuilder<'a> {
             let chart =
                 self.chart_of(*triangle).and_then(|chart| chart.checked_sub(first as usize));
             let Some(chart) = chart else { continue };
-            let chart = chart.min(pictures.len() - 1);
             let texel = |vertex: u32| mapping.texel(self.mesh.texcoords[vertex as usize]);
             lists[chart].corners.push(triangle.map(texel));
             lists[chart].charts.push(0);

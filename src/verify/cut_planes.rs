@@ -4,11 +4,13 @@
 //! plane of a cut that bounds their node, one or two of them together and joined to nothing else.
 //! They show only where levels meet. The source has no surface there, and skirts promise none: so
 //! they are no part of the distances between surfaces. What they do promise, that nothing shows
-//! between two levels, [`super::gaps`] checks. A skirt that is made otherwise counts as surface,
+//! between two levels, [`super::gaps`] checks. Where the source does have a wall in such a plane,
+//! what stands for it in a coarse node may be taken for a skirt, so nothing is measured from there. A skirt that is made otherwise counts as surface,
 //! and must be as near to the source as all of its node.
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use glam::DVec3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -46,32 +48,31 @@ pub(super) fn mark(scene: &Scene, geometry: &mut [NodeGeometry], seams: &[Seam],
         }
     }
     geometry.par_iter_mut().enumerate().for_each(|(number, node)| {
-        if is_leaf(scene, number as u32) || planes[number].is_empty() {
+        if planes[number].is_empty() {
             return;
         }
         let planes: Vec<(usize, f64)> =
             planes[number].iter().map(|&(axis, bits)| (axis, f64::from_bits(bits))).collect();
-        let alone = stand_alone(node);
-        node.in_cut_plane = node
-            .triangles
-            .iter()
-            .zip(alone)
-            .map(|(&triangle, alone)| {
-                if !alone {
-                    return false;
-                }
-                let corners = node.corners(triangle);
-                let [a, b, c] = corners;
-                let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-                let beside = 2.0 * steps[number] + BESIDE * longest;
-                let normal = cross(corners);
-                planes.iter().any(|&(axis, coordinate)| {
-                    let across = normal[axis].abs() >= FACING * normal.length();
-                    across
-                        && corners.iter().all(|corner| (corner[axis] - coordinate).abs() <= beside)
-                })
+        let lies_in_one = |corners: [DVec3; 3]| {
+            let [a, b, c] = corners;
+            let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+            let beside = 2.0 * steps[number] + BESIDE * longest;
+            let normal = cross(corners);
+            planes.iter().any(|&(axis, coordinate)| {
+                let across = normal[axis].abs() >= FACING * normal.length();
+                across && corners.iter().all(|corner| (corner[axis] - coordinate).abs() <= beside)
             })
-            .collect();
+        };
+        if is_leaf(scene, number as u32) {
+            let lies = |&triangle: &[u32; 3]| lies_in_one(node.corners(triangle));
+            node.beside_skirts = node.triangles.iter().map(lies).collect();
+        } else {
+            let alone = stand_alone(node).into_iter().zip(&node.triangles);
+            let lies = |(alone, &triangle): (bool, &[u32; 3])| {
+                alone && lies_in_one(node.corners(triangle))
+            };
+            node.in_cut_plane = alone.map(lies).collect();
+        }
     });
 }
 
@@ -134,7 +135,6 @@ fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<Plane
 mod tests {
     use super::*;
     use crate::format::test_scene::scene;
-    use glam::DVec3;
 
     #[test]
     fn the_plane_is_found_beside_other_coordinates_that_edges_share() {
