@@ -4,9 +4,9 @@
 //! plane of a cut that bounds their node, one or two of them together and joined to nothing else.
 //! They show only where levels meet. The source has no surface there, and skirts promise none: so
 //! they are no part of the distances between surfaces. What they do promise, that nothing shows
-//! between two levels, [`super::gaps`] checks. Where the source does have a wall in such a plane,
-//! what stands for it in a coarse node may be taken for a skirt, so nothing is measured from there. A skirt that is made otherwise counts as surface,
-//! and must be as near to the source as all of its node.
+//! between two levels, [`super::gaps`] checks. A skirt that is made otherwise counts as surface,
+//! and must be as near to the source as all of its node; so do those in a plane that the source has
+//! a wall in, where what is left of the wall looks the same.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,7 +18,7 @@ use super::geometry::NodeGeometry;
 use super::runs::Runs;
 use super::sample::cross;
 use super::seams::Seam;
-use super::tree::{apart, is_leaf};
+use super::tree::{apart, is_leaf, leaves, line};
 use crate::format::{Node, Scene};
 use crate::mesh::{PositionKey, key};
 
@@ -47,33 +47,45 @@ pub(super) fn mark(scene: &Scene, geometry: &mut [NodeGeometry], seams: &[Seam],
             }
         }
     }
+    // Planes that the source has walls in: what stands for those cannot be told from skirts.
+    let mut walls: Vec<BTreeSet<Plane>> = vec![BTreeSet::new(); geometry.len()];
+    for leaf in leaves(scene) {
+        let around: BTreeSet<Plane> =
+            line(scene, leaf).flat_map(|node| &planes[node as usize]).copied().collect();
+        let node = &geometry[leaf as usize];
+        let of_leaf = around.into_iter().filter(|plane| {
+            let mut corners = node.triangles.iter().map(|&triangle| node.corners(triangle));
+            corners.any(|corners| lies_in(corners, plane, steps[leaf as usize]))
+        });
+        for plane in of_leaf.collect::<Vec<_>>() {
+            for above in line(scene, leaf) {
+                walls[above as usize].insert(plane);
+            }
+        }
+    }
     geometry.par_iter_mut().enumerate().for_each(|(number, node)| {
-        if planes[number].is_empty() {
+        let planes: Vec<&Plane> = planes[number].difference(&walls[number]).collect();
+        if is_leaf(scene, number as u32) || planes.is_empty() {
             return;
         }
-        let planes: Vec<(usize, f64)> =
-            planes[number].iter().map(|&(axis, bits)| (axis, f64::from_bits(bits))).collect();
-        let lies_in_one = |corners: [DVec3; 3]| {
-            let [a, b, c] = corners;
-            let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-            let beside = 2.0 * steps[number] + BESIDE * longest;
-            let normal = cross(corners);
-            planes.iter().any(|&(axis, coordinate)| {
-                let across = normal[axis].abs() >= FACING * normal.length();
-                across && corners.iter().all(|corner| (corner[axis] - coordinate).abs() <= beside)
-            })
+        let alone = stand_alone(node).into_iter().zip(&node.triangles);
+        let is_skirt = |(alone, &triangle): (bool, &[u32; 3])| {
+            let corners = node.corners(triangle);
+            alone && planes.iter().any(|plane| lies_in(corners, plane, steps[number]))
         };
-        if is_leaf(scene, number as u32) {
-            let lies = |&triangle: &[u32; 3]| lies_in_one(node.corners(triangle));
-            node.beside_skirts = node.triangles.iter().map(lies).collect();
-        } else {
-            let alone = stand_alone(node).into_iter().zip(&node.triangles);
-            let lies = |(alone, &triangle): (bool, &[u32; 3])| {
-                alone && lies_in_one(node.corners(triangle))
-            };
-            node.in_cut_plane = alone.map(lies).collect();
-        }
+        node.in_cut_plane = alone.map(is_skirt).collect();
     });
+}
+
+/// Whether a triangle of a node with this lattice step lies in a plane.
+fn lies_in(corners: [DVec3; 3], &(axis, bits): &Plane, step: f64) -> bool {
+    let coordinate = f64::from_bits(bits);
+    let [a, b, c] = corners;
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let beside = 2.0 * step + BESIDE * longest;
+    let normal = cross(corners);
+    normal[axis].abs() >= FACING * normal.length()
+        && corners.iter().all(|corner| (corner[axis] - coordinate).abs() <= beside)
 }
 
 /// Triangles a skirt has.

@@ -16,9 +16,6 @@ pub(super) struct NodeGeometry {
     pub triangles: Vec<[u32; 3]>,
     /// Which triangles lie in a cutting plane (see [`super::cut_planes`]); empty where none does.
     pub in_cut_plane: Vec<bool>,
-    /// Of a leaf, which triangles lie in a plane at which it was cut. What a coarse node has there
-    /// cannot be told from its skirts, so nothing is measured from these; empty where none does.
-    pub beside_skirts: Vec<bool>,
 }
 
 impl NodeGeometry {
@@ -54,25 +51,16 @@ impl NodeGeometry {
             .map(|(number, &triangle)| (number, self.corners(triangle)))
     }
 
-    /// The same without those that lie where coarse nodes have skirts.
-    pub fn apart_from_skirts(&self) -> impl Iterator<Item = (u32, [DVec3; 3])> {
-        self.surface().filter(|&(number, _)| !self.is_beside_skirts(number))
-    }
-
-    fn is_beside_skirts(&self, triangle: u32) -> bool {
-        self.beside_skirts.get(triangle as usize).copied().unwrap_or(false)
-    }
-
     /// False for a triangle in a cutting plane.
     pub fn is_surface(&self, triangle: u32) -> bool {
         !self.in_cut_plane.get(triangle as usize).copied().unwrap_or(false)
     }
 
-    /// Vertices of triangles that are surface and do not lie where coarse nodes have skirts.
+    /// Vertices of triangles that are surface.
     pub fn surface_vertices(&self) -> Vec<DVec3> {
         let mut used = vec![false; self.positions.len()];
         for (number, triangle) in (0..).zip(&self.triangles) {
-            if self.is_surface(number) && !self.is_beside_skirts(number) {
+            if self.is_surface(number) {
                 triangle.iter().for_each(|&vertex| used[vertex as usize] = true);
             }
         }

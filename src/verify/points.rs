@@ -32,7 +32,7 @@ impl Points {
         for &leaf in leaves {
             let node = &geometry[leaf as usize];
             let id = scene.nodes[leaf as usize].id;
-            points.all.extend(spread(node.apart_from_skirts(), density, seed, id));
+            points.all.extend(spread(node.surface(), density, seed, id));
             points.leaf.resize(points.all.len(), leaf);
             points.first.push(points.all.len());
         }

@@ -149,7 +149,6 @@ mod tests {
                 [from, 1.0, 0.0],
             ],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
-            beside_skirts: Vec::new(),
             in_cut_plane: Vec::new(),
         }
     }
