@@ -8,7 +8,8 @@ const { serve } = require('./server.js');
 const SIZE = { width: 960, height: 640 };
 /** The whole, and a part of it. */
 const FAR = { radii: 2.4 };
-const NEAR = { radii: 0.35, pitch: -30 };
+/** One pixel of error: small cities have small errors on all levels. */
+const NEAR = { radii: 0.35, pitch: -30, error: 1 };
 /** Pixels of error that no node's level has and every group of nodes: the coarsest that is drawn. */
 const COARSE = 200;
 /** Pixels that must show the city, of all. */
