@@ -487,4 +487,50 @@ mod tests {
         // What joined them is gone.
         assert!(kept.area() < 400.0, "{}", kept.area());
     }
+
+    /// Houses of 12 triangles each, all apart.
+    fn houses(count: u16) -> Mesh {
+        let mut mesh = Mesh::default();
+        for house in 0..count {
+            let (x, y) = (f32::from(house % 20) * 14.0, f32::from(house / 20) * 18.0);
+            let first = mesh.positions.len() as u32;
+            for z in [0.0, 6.0] {
+                let corners = [[0.0, 0.0], [8.0, 0.0], [8.0, 11.0], [0.0, 11.0]];
+                mesh.positions.extend(corners.map(|[i, j]| [x + i, y + j, z]));
+            }
+            let mut triangles = vec![[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]];
+            for (i, j) in [(0, 1), (1, 2), (2, 3), (3, 0)] {
+                triangles.extend([[i, j, j + 4], [i, j + 4, i + 4]]);
+            }
+            mesh.triangles.extend(triangles.iter().map(|t| t.map(|vertex| first + vertex)));
+        }
+        mesh.materials = vec![0; mesh.positions.len()];
+        mesh
+    }
+
+    #[test]
+    fn many_houses_with_few_triangles_each_become_boxes() {
+        let mesh = houses(200);
+        let border = Border::interior(mesh.positions.len());
+        let simplified = |target| {
+            let weights = AppearanceWeights::default();
+            let (path, up, qem) = (Path::default(), UpAxis::Z, Simplifier::Qem);
+            simplify(&mesh, &border, &path, 0, target, up, qem, weights)
+        };
+        let few = simplified(600);
+        assert_eq!(few.step, LadderStep::Boxes);
+        assert!(few.mesh.triangles.len() <= 660, "{}", few.mesh.triangles.len());
+        assert_eq!(few.border.keep.len(), few.mesh.positions.len());
+        let alone = collapse(
+            &mesh,
+            &border,
+            &vec![false; mesh.positions.len()],
+            600,
+            LadderStep::Across,
+            AppearanceWeights::default(),
+        );
+        let to = |other: &Mesh| mean_distance(&mesh, other);
+        assert!(to(&few.mesh) < to(&alone.mesh), "{} {}", to(&few.mesh), to(&alone.mesh));
+        assert_ne!(simplified(2400).step, LadderStep::Boxes, "enough for all");
+    }
 }

@@ -168,4 +168,53 @@ mod tests {
         let beside = seam([5.01, 0.0, 0.0], [5.02, 4.0, 1.0]);
         assert_eq!(plane_between(&[&beside], [&flat[0], &flat[1]], 1e-6), None);
     }
+
+    /// Two coarse nodes with a leaf each, apart at x = 5; the first has two triangles in that plane.
+    #[test]
+    fn what_lies_in_a_plane_is_a_skirt_unless_the_source_has_a_wall_there() {
+        let node = |parent, first_child, next_sibling, low: f64, high: f64| Node {
+            parent,
+            first_child,
+            next_sibling,
+            bbox_min: [low, 0.0, 0.0],
+            bbox_max: [high, 9.0, 4.0],
+            ..scene().nodes[0].clone()
+        };
+        let nodes = vec![
+            node(None, Some(1), None, 0.0, 11.0),
+            node(Some(0), Some(3), Some(2), 0.0, 5.0),
+            node(Some(0), Some(4), None, 5.0, 11.0),
+            node(Some(1), None, None, 0.0, 5.0),
+            node(Some(2), None, None, 5.0, 11.0),
+        ];
+        let scene = Scene { nodes, ..scene() };
+        let seams =
+            [Seam { ends: [DVec3::new(5.0, 0.0, 0.0), DVec3::new(5.0, 9.0, 0.0)], leaves: [3, 4] }];
+        let floor = |x: f32| [[x, 0.0, 0.0], [x + 5.0, 0.0, 0.0], [x + 5.0, 9.0, 0.0]];
+        let upright = [[5.0, 0.0, 1.0], [5.0, 9.0, 1.0], [5.0, 9.0, 3.0], [5.0, 0.0, 3.0]];
+        let geometry_of = |parts: &[&[[f32; 3]]]| {
+            let mut geometry = NodeGeometry::default();
+            for part in parts {
+                let first = geometry.positions.len() as u32;
+                geometry.positions.extend_from_slice(part);
+                let fan = (1..part.len() as u32 - 1).map(|v| [first, first + v, first + v + 1]);
+                geometry.triangles.extend(fan);
+            }
+            geometry
+        };
+        let [ground, far] = [floor(0.0), floor(5.0)];
+        for (wall, expected) in [(false, [false, true, true]), (true, [false; 3])] {
+            let leaf = if wall { vec![&ground[..], &upright] } else { vec![&ground[..]] };
+            let mut geometry = vec![
+                NodeGeometry::default(),
+                geometry_of(&[&ground, &upright]),
+                geometry_of(&[&far]),
+                geometry_of(&leaf),
+                geometry_of(&[&far]),
+            ];
+            mark(&scene, &mut geometry, &seams, &[1e-6; 5]);
+            let marked: Vec<bool> = (0..3).map(|t| !geometry[1].is_surface(t)).collect();
+            assert_eq!(marked, expected, "wall in the source: {wall}");
+        }
+    }
 }

@@ -15,6 +15,7 @@ use glam::Vec3;
 
 use super::ALLOWANCE;
 use super::grid::TriangleGrid;
+use super::triangle::from_longest_side;
 use crate::mesh::Mesh;
 
 /// Sides and triangles are divided at most so often, or once for so many triangles of the mesh,
@@ -116,15 +117,7 @@ fn ends_of_side(search: &mut Search, part: &Part<2>) -> [[Corner; 2]; 2] {
 
 /// The halves beside the middle of the longest side.
 fn halve_triangle(search: &mut Search, part: &Part<3>) -> [[Corner; 3]; 2] {
-    let [a, b, c] = part.corners;
-    let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(a, b)| a.at.distance_squared(b.at));
-    let (a, b, c) = if ab >= bc && ab >= ca {
-        (a, b, c)
-    } else if bc >= ca {
-        (b, c, a)
-    } else {
-        (c, a, b)
-    };
+    let [a, b, c] = from_longest_side(part.corners, |corner| corner.at);
     let middle = search.measure((a.at + b.at) * 0.5);
     [[a, middle, c], [middle, b, c]]
 }

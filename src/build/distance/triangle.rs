@@ -21,23 +21,28 @@ pub(super) struct Triangle {
     per_squared: [f32; 2],
 }
 
+/// The corners in the same order round, so that the longest side lies between the first two.
+pub(super) fn from_longest_side<T: Copy>([a, b, c]: [T; 3], at: impl Fn(T) -> Vec3) -> [T; 3] {
+    let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(a, b)| at(a).distance_squared(at(b)));
+    if ab >= bc && ab >= ca {
+        [a, b, c]
+    } else if bc >= ca {
+        [b, c, a]
+    } else {
+        [c, a, b]
+    }
+}
+
 /// Square of the height of a triangle over its longest side, below which it is a needle.
 const NEEDLE_SQUARED: f32 = 1e-4;
 
 impl Triangle {
-    pub(super) fn new([a, b, c]: [Vec3; 3]) -> Self {
-        let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(a, b)| a.distance_squared(b));
-        let (a, b, c) = if ab >= bc && ab >= ca {
-            (a, b, c)
-        } else if bc >= ca {
-            (b, c, a)
-        } else {
-            (c, a, b)
-        };
+    pub(super) fn new(corners: [Vec3; 3]) -> Self {
+        let [a, b, c] = from_longest_side(corners, |corner| corner);
         let along = (b - a).try_normalize().unwrap_or(Vec3::X);
         let aside = |way: Vec3| way - along * way.dot(along);
         let mut up = aside(c - a);
-        if up.length_squared() < NEEDLE_SQUARED * ca.max(ab).max(bc) {
+        if up.length_squared() < NEEDLE_SQUARED * a.distance_squared(b) {
             // What is left of a needle's apex is rounding, which need not be square to its side.
             up = up.try_normalize().map_or(Vec3::ZERO, aside);
         }
