@@ -17,6 +17,7 @@ use super::progress::Progress;
 use super::shared_borders::{keep_shared, shared_positions};
 use super::stages::{Stage, Stages};
 use super::stray::set_strays_aside;
+use super::windings::turnable;
 use crate::Result;
 use crate::format::{BlockInfo, Encoding, OutputDir};
 use crate::mesh::{Material, Model, Part, UpAxis, Warnings};
@@ -134,6 +135,7 @@ pub fn build_input(
         &texture_plan,
         drafts.iter().map(|draft| draft.materials.iter().copied()),
     );
+    let turnable: Vec<bool> = model.materials.iter().map(turnable).collect();
     let prefix = file_prefix(&model.source);
     let built = in_parallel(drafts, |number, draft| {
         let lattice = if draft.far { lattice_of([&draft]) } else { common };
@@ -190,6 +192,7 @@ pub fn build_input(
             bake: textures.bake_plan().filter(|_| has_room_for_charts(options)),
             lattice,
             up,
+            turnable: &turnable,
             sink: &sink,
             stages,
         };

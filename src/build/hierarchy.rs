@@ -17,7 +17,7 @@ use super::lattice::Lattice;
 use super::merge::merge;
 use super::remnant::remnant;
 use super::seamless::without_seams;
-use super::simplify::{AppearanceWeights, LadderStep, Simplified, Simplifier, simplify};
+use super::simplify::{AppearanceWeights, LadderStep, Method, Simplified, Simplifier, simplify};
 use super::skirt::{Skirt, skirts, triangles_of};
 use super::stages::{Stage, Stages};
 use super::thin_border::thin_border;
@@ -53,8 +53,15 @@ pub enum BorderMode {
     Skirts,
 }
 
-/// A node may not be simplified to fewer triangles than this: a piece must not vanish.
-pub const LEAST_TRIANGLES: usize = 8;
+/// Where simplification leaves nothing, so many of the largest triangles stay: a piece must not
+/// vanish.
+const REMNANT_TRIANGLES: usize = 8;
+
+/// A node's budget is at least this share of `desired_tris`, where its piece has so many. Pieces
+/// with few triangles are walls and roofs that stand alone, and large: dividing their number by
+/// that of a level saves next to nothing and takes whole sides off them. Measured on `ingolstadt`:
+/// 0.2 % more triangles on level 1, at less than half the mean distance.
+const LEAST_BUDGET: f64 = 1.0 / 8.0;
 
 /// A node keeps at most one border vertex on a plane for this many triangles of its budget: each
 /// costs about a triangle of the mesh and two of a skirt, and a node has two planes. Measured: with
@@ -167,6 +174,8 @@ pub struct BlockBuilder<'a, S> {
     pub lattice: Lattice,
     /// Which axis points at the sky.
     pub up: UpAxis,
+    /// Of each material, whether its faces may turn ([`super::windings`]).
+    pub turnable: &'a [bool],
     /// Where nodes go.
     pub sink: &'a S,
     /// Where the time goes.
@@ -217,8 +226,9 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             return Ok((Tree { record, children: Vec::new() }, None));
         }
         let triangles = piece.mesh.triangles.len();
-        let budget = ((triangles as f64 / self.factors[level]).round() as usize)
-            .max(LEAST_TRIANGLES.min(triangles));
+        let least = (f64::from(self.options.desired_tris) * LEAST_BUDGET).ceil() as usize;
+        let budget =
+            ((triangles as f64 / self.factors[level]).round() as usize).max(least.min(triangles));
         let path = piece.path.clone();
         let from_original =
             self.options.simplify_from == SimplifyFrom::Original || level + 1 == self.leaf_level();
@@ -440,9 +450,10 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
         let HierarchyOptions { simplifier, weights, .. } = *self.options;
         let weights = AppearanceWeights { keep_folds, ..weights };
-        let mut result = simplify(&mesh, &border, path, at, target, self.up, simplifier, weights);
+        let method = Method { simplifier, weights, up: self.up, turnable: self.turnable };
+        let mut result = simplify(&mesh, &border, path, at, target, &method);
         if result.mesh.triangles.is_empty() {
-            result = remnant(source, &border, LEAST_TRIANGLES.min(target));
+            result = remnant(source, &border, REMNANT_TRIANGLES.min(target));
         }
         let skirts = skirts(&result.mesh, &result.border, &runs, path, step);
         (result, runs, skirts)

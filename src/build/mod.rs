@@ -34,6 +34,7 @@ pub mod stages;
 pub mod stray;
 pub mod thin_border;
 pub mod up;
+pub mod windings;
 
 pub use options::BuildOptions;
 pub use pipeline::{Outcome, build};

@@ -3,10 +3,12 @@
 //! 1. Quadric edge collapse with attributes (Garland & Heckbert as meshoptimizer has it, with
 //!    vertex positions and attributes solved for afterwards), inside texture seams.
 //! 2. The same, allowed to collapse across texture seams but not across material borders.
-//! 3. Whichever of these is measured to stay nearest to the input on average:
+//! 3. Where that misses the budget, or moves the surface far for the triangles that it leaves,
+//!    whichever of these and it is measured to stay nearest to the input on average:
 //!    - the same, across material borders too; triangles then get one material each again
 //!      ([`super::mend_materials`]);
 //!    - the same, also leaving out the smallest separate parts;
+//!    - the same as the first, of faces that wind one way ([`super::windings`]);
 //!    - vertex clustering ([`super::cluster`]), which has no topology to respect.
 //!
 //! Where the mesh is many separate bodies and the budget leaves few triangles to each, boxes for
@@ -23,8 +25,9 @@ use super::aggregate::{Aggregated, aggregate};
 use super::border::{Border, Fate, Path};
 use super::cluster::cluster;
 use super::compact::compact;
-use super::distance::mean_distance;
+use super::distance::MeanDistance;
 use super::mend_materials::mend_materials;
+use super::windings::wound_one_way;
 use crate::mesh::{Mesh, PositionKey, UpAxis, key};
 
 /// Which method makes the coarse levels.
@@ -54,6 +57,8 @@ pub enum LadderStep {
     Across,
     /// Edge collapse across texture seams and material borders, with the smallest separate parts left out.
     Prune,
+    /// Edge collapse across texture seams and material borders of faces that wind one way.
+    Wound,
     /// Vertex clustering.
     Clustering,
     /// Boxes in place of small separate bodies, and edge collapse of the rest.
@@ -71,6 +76,7 @@ impl LadderStep {
             Self::Permissive => "edge collapse across texture seams",
             Self::Across => "edge collapse across material borders",
             Self::Prune => "edge collapse without the smallest separate parts",
+            Self::Wound => "edge collapse of faces turned one way",
             Self::Clustering => "vertex clustering",
             Self::Boxes => "boxes for small separate bodies",
             Self::Remnant => "the largest triangles alone",
@@ -113,6 +119,25 @@ pub struct Simplified {
     pub step: LadderStep,
 }
 
+/// How pieces are simplified.
+#[derive(Clone, Copy, Debug)]
+pub struct Method<'a> {
+    /// See [`Simplifier`].
+    pub simplifier: Simplifier,
+    /// See [`AppearanceWeights`].
+    pub weights: AppearanceWeights,
+    /// Which axis points at the sky.
+    pub up: UpAxis,
+    /// Of each material, whether its faces may turn ([`super::windings`]).
+    pub turnable: &'a [bool],
+}
+
+/// Edge collapse that moves the surface by more than this share of the side of a square as large as
+/// a triangle may have may have worn away what else would be kept, and is compared with other ways.
+/// Of what comparing everywhere gains, 80 to 99 % are gained so; of the nodes of scans, where
+/// hardly any gain, 5 % are compared.
+const DOUBTFUL: f64 = 0.2;
+
 /// Simplifies `mesh`, whose border is thinned already ([`super::thin_border`]), to at most about
 /// `target` triangles as a node of `path` at `level`.
 pub fn simplify(
@@ -121,10 +146,9 @@ pub fn simplify(
     path: &Path,
     level: u8,
     target: usize,
-    up: UpAxis,
-    simplifier: Simplifier,
-    weights: AppearanceWeights,
+    method: &Method,
 ) -> Simplified {
+    let &Method { simplifier, weights, up, turnable } = method;
     let (mesh, border) = compact(mesh, border);
     let locked: Vec<bool> = border
         .planes
@@ -150,33 +174,64 @@ pub fn simplify(
         }
     }
     let mut candidates = Vec::new();
-    if best.mesh.triangles.len() > limit {
-        candidates.push(collapsed(LadderStep::Across));
+    let doubtful = DOUBTFUL * (source.mesh.area() / target as f64).sqrt();
+    if best.mesh.triangles.len() > limit || best.error > doubtful {
+        if has_seams(&source.mesh) {
+            candidates.push(collapsed(LadderStep::Across));
+        }
         candidates.push(collapsed(LadderStep::Prune));
         candidates.push(clustered(&source.mesh, &source.border, &locked, target));
+        candidates.extend(wound(&source, &locked, target, weights, turnable));
     }
     candidates.extend(boxes);
     if candidates.is_empty() {
         return best;
     }
     // Within the budget and nearest to the input; else the fewest triangles.
-    let rank = |candidate: &Simplified| {
+    let mut from_source = MeanDistance::from(&source.mesh);
+    let mut rank = |candidate: &Simplified, best: (u8, f64)| {
         let triangles = candidate.mesh.triangles.len();
         if triangles <= limit {
-            (0, mean_distance(&source.mesh, &candidate.mesh))
+            let nearest = if best.0 == 0 { best.1 } else { f64::INFINITY };
+            (0, from_source.to(&candidate.mesh, nearest))
         } else {
             (1, triangles as f64)
         }
     };
-    let mut best = (rank(&best), best);
+    let mut best = (rank(&best, (1, f64::INFINITY)), best);
     for candidate in candidates {
-        let rank = rank(&candidate);
+        let rank = rank(&candidate, best.0);
         if !candidate.mesh.triangles.is_empty() && rank.partial_cmp(&best.0) == Some(Ordering::Less)
         {
             best = (rank, candidate);
         }
     }
     best.1
+}
+
+/// Whether vertices may differ in more than their place.
+fn has_seams(mesh: &Mesh) -> bool {
+    !mesh.texcoords.is_empty()
+        || !mesh.colors.is_empty()
+        || mesh.materials.windows(2).any(|pair| pair[0] != pair[1])
+}
+
+/// Edge collapse of faces that wind one way, each there once; `None` where they do already.
+fn wound(
+    source: &Simplified,
+    locked: &[bool],
+    target: usize,
+    weights: AppearanceWeights,
+    turnable: &[bool],
+) -> Option<Simplified> {
+    let triangles = wound_one_way(&source.mesh, turnable)?;
+    let mesh = Mesh { triangles, ..source.mesh.clone() };
+    let step = LadderStep::Wound;
+    if mesh.triangles.len() > target {
+        return Some(collapse(&mesh, &source.border, locked, target, step, weights));
+    }
+    let (mesh, border) = compact(&mesh, &source.border);
+    Some(Simplified { mesh, border, error: 0.0, step })
 }
 
 /// Boxes for small bodies, and the rest collapsed; `None` where there are too few bodies.
@@ -452,7 +507,7 @@ mod tests {
                 (along(&found) - along(mesh)).abs()
             });
             assert!(low.max(high) < 0.1 * (mesh.texcoords[24 * 25][0] - mesh.texcoords[0][0]));
-            mean_distance(mesh, &found)
+            MeanDistance::from(mesh).to(&found, f64::INFINITY)
         };
         // Sizes of the picture are powers of two, which change no digit.
         let near = error(&mapped(0.0, 1.0 / 32.0));
@@ -514,8 +569,9 @@ mod tests {
         let border = Border::interior(mesh.positions.len());
         let simplified = |target| {
             let weights = AppearanceWeights::default();
-            let (path, up, qem) = (Path::default(), UpAxis::Z, Simplifier::Qem);
-            simplify(&mesh, &border, &path, 0, target, up, qem, weights)
+            let (simplifier, up, turnable) = (Simplifier::Qem, UpAxis::Z, &[true][..]);
+            let method = Method { simplifier, weights, up, turnable };
+            simplify(&mesh, &border, &Path::default(), 0, target, &method)
         };
         let few = simplified(600);
         assert_eq!(few.step, LadderStep::Boxes);
@@ -529,7 +585,7 @@ mod tests {
             LadderStep::Across,
             AppearanceWeights::default(),
         );
-        let to = |other: &Mesh| mean_distance(&mesh, other);
+        let to = |other: &Mesh| MeanDistance::from(&mesh).to(other, f64::INFINITY);
         assert!(to(&few.mesh) < to(&alone.mesh), "{} {}", to(&few.mesh), to(&alone.mesh));
         assert_ne!(simplified(2400).step, LadderStep::Boxes, "enough for all");
     }

@@ -162,6 +162,7 @@ pub fn build(piece: Piece, lattice: Lattice, options: &HierarchyOptions) -> Vec<
         bake: None,
         lattice,
         up: hlod::mesh::UpAxis::Z,
+        turnable: &[true],
         sink: &sink,
         stages: &Default::default(),
     };

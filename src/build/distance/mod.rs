@@ -10,20 +10,19 @@
 
 mod farthest;
 mod grid;
+mod mean;
 mod triangle;
 
 use glam::Vec3;
 
 use self::farthest::farthest;
 use self::grid::TriangleGrid;
+pub use self::mean::MeanDistance;
 use crate::mesh::Mesh;
 
 /// The measured distance is multiplied by this, since the farthest point of a surface need not be
 /// one of those that are measured.
 pub const ALLOWANCE: f64 = 2.0;
-
-/// Points that are tried in each direction for the mean; evenly spread over the triangles.
-const MOST_SAMPLES: usize = 320;
 
 /// A bound on the two-sided distance between two meshes over the same surface, metres.
 pub fn hausdorff(source: &Mesh, simplified: &Mesh) -> f64 {
@@ -42,34 +41,11 @@ fn rounding(mesh: &Mesh) -> f32 {
     4.0 * f32::EPSILON * Vec3::from(low).abs().max(Vec3::from(high).abs()).max_element()
 }
 
-/// The mean distance between two meshes, metres: that of the triangles' centres, weighted by
-/// area, from each to the other, added up. Unlike the largest distance it tells a mesh that lost
-/// a lamp post from one that is bent all over.
-pub fn mean_distance(source: &Mesh, simplified: &Mesh) -> f64 {
-    if source.triangles.is_empty() || simplified.triangles.is_empty() {
-        return f64::INFINITY;
-    }
-    mean_one_way(source, simplified) + mean_one_way(simplified, source)
-}
-
-fn mean_one_way(from: &Mesh, to: &Mesh) -> f64 {
-    let grid = TriangleGrid::new(to);
-    let stride = from.triangles.len().div_ceil(4 * MOST_SAMPLES).max(1);
-    let (mut sum, mut weights) = (0f64, 0f64);
-    for &triangle in from.triangles.iter().step_by(stride) {
-        let [a, b, c] = triangle.map(|v| Vec3::from(from.positions[v as usize]));
-        let area = from.triangle_area(triangle);
-        sum += area * f64::from(grid.distance_beyond((a + b + c) / 3.0, 0.0));
-        weights += area;
-    }
-    if weights > 0.0 { sum / weights } else { 0.0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Mesh {
+    pub(super) fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Mesh {
         Mesh {
             positions: positions.to_vec(),
             materials: vec![0; positions.len()],
