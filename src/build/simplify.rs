@@ -27,7 +27,7 @@ use super::cluster::cluster;
 use super::compact::compact;
 use super::distance::MeanDistance;
 use super::mend_materials::mend_materials;
-use super::windings::wound_one_way;
+use super::windings::{has_doubles, wound_one_way};
 use crate::mesh::{Mesh, PositionKey, UpAxis, key};
 
 /// Which method makes the coarse levels.
@@ -175,7 +175,7 @@ pub fn simplify(
     }
     let mut candidates = Vec::new();
     let doubtful = DOUBTFUL * (source.mesh.area() / target as f64).sqrt();
-    if best.mesh.triangles.len() > limit || best.error > doubtful {
+    if best.mesh.triangles.len() > limit || best.error > doubtful || has_doubles(&source.mesh) {
         if has_seams(&source.mesh) {
             candidates.push(collapsed(LadderStep::Across));
         }

@@ -5,7 +5,9 @@
 //! both sides of a face are drawn, neither changes what is seen. Coarse nodes may therefore have
 //! them in order, or nothing there would collapse. Leaves stay as the source is.
 
-use rustc_hash::{FxHashMap, FxHashSet};
+use std::hash::BuildHasher;
+
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 
 use crate::mesh::{AlphaMode, Material, Mesh, PositionKey, key};
 
@@ -51,6 +53,18 @@ pub fn wound_one_way(mesh: &Mesh, turnable: &[bool]) -> Option<Vec<[u32; 3]>> {
     }
     let changed = turning.len() + mesh.triangles.len() - triangles.len();
     (changed as f64 > FEW * mesh.triangles.len() as f64).then_some(triangles)
+}
+
+/// Whether more than a few faces lie where others do. The quadrics of such sheets know no border:
+/// folded in at their rims they count as unchanged.
+pub fn has_doubles(mesh: &Mesh) -> bool {
+    let hasher = FxBuildHasher;
+    let hashes: Vec<u64> = mesh.positions.iter().map(|&p| hasher.hash_one(key(p))).collect();
+    let mut seen = FxHashSet::default();
+    seen.reserve(mesh.triangles.len());
+    let sum = |t: &[u32; 3]| t.iter().fold(0, |sum: u64, &v| sum.wrapping_add(hashes[v as usize]));
+    let again = mesh.triangles.iter().filter(|t| !seen.insert(sum(t))).count();
+    again as f64 > FEW * mesh.triangles.len() as f64
 }
 
 fn sides([a, b, c]: [u32; 3]) -> [(u32, u32); 3] {
@@ -159,7 +173,9 @@ mod tests {
         mesh.materials[81..].fill(1);
         let back = |t: &[u32; 3]| t.map(|vertex| backs[vertex as usize]);
         let turned: Vec<_> = mesh.triangles.iter().map(back).map(|[a, b, c]| [a, c, b]).collect();
+        assert!(!has_doubles(&mesh));
         mesh.triangles.extend(turned);
+        assert!(has_doubles(&mesh));
         let not_seen = wound_one_way(&mesh, &[true, false]);
         assert_eq!(not_seen, None, "backs that are not seen from the front");
         mesh.triangles = wound_one_way(&mesh, &[true, true]).unwrap();

@@ -151,17 +151,7 @@ fn odd_surfaces_are_as_good_as_sound_ones() {
 
     let mut inverted = Shape::hills();
     inverted.faces.iter_mut().step_by(3).for_each(|face| face.swap(1, 2));
-    let stuck: Bounds = &[
-        ("RMS", 5.0),
-        ("stored", 10.0),
-        ("colour", 0.1),
-        ("nodes", 0.1),
-        ("triangles drawn", 0.1),
-        ("toggles", 0.1),
-        ("triangles, level", 0.05),
-    ];
-    let why = "edges of faces that wind against each other do not collapse: clustered instead";
-    check("each third face inverted", &inverted, &hills, stuck, why);
+    check("each third face inverted", &inverted, &hills, &[], "");
 
     let mut doubled = Shape::hills();
     doubled.faces.extend_from_within(..);
@@ -182,19 +172,25 @@ fn odd_surfaces_are_as_good_as_sound_ones() {
     above.faces.extend_from_within(..);
     above.faces[low..].iter_mut().for_each(|face| *face = face.map(|v| v + count));
     above.faces[low..].iter_mut().for_each(|face| face.swap(1, 2));
-    let stuck: Bounds = &[
-        ("RMS", 25.0),
-        ("stored", 12.0),
-        ("colour", 1.0),
-        ("nodes", 0.5),
-        ("triangles drawn", 0.5),
-        ("toggles", 0.5),
-        ("triangles, level", 0.5),
+    let nearer: Bounds = &[
+        ("RMS", 1.0),
+        ("stored", 1.0),
+        ("colour", 0.3),
+        ("nodes", 0.3),
+        ("triangles drawn", 0.3),
+        ("toggles", 0.3),
+        ("triangles, level", 0.2),
         ("frame", 0.2),
         ("expected", 0.2),
     ];
-    let why = "edges of four faces do not collapse: clustered instead";
-    check("all faces from both sides", &both, &twins("two sides 0.1 mm apart", &above), stuck, why);
+    let why = "coarse levels have one side alone, and so twice the triangles for it";
+    check(
+        "all faces from both sides",
+        &both,
+        &twins("two sides 0.1 mm apart", &above),
+        nearer,
+        why,
+    );
 
     let fewer: Bounds = &[
         ("leaf triangles", 0.26),
