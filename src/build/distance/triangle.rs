@@ -36,6 +36,9 @@ pub(super) fn from_longest_side<T: Copy>([a, b, c]: [T; 3], at: impl Fn(T) -> Ve
 /// Square of the height of a triangle over its longest side, below which it is a needle.
 const NEEDLE_SQUARED: f32 = 1e-4;
 
+/// Square of what a direction has aside of a needle, at least, to tell where its apex is.
+const MOSTLY_ASIDE_SQUARED: f32 = 0.25;
+
 impl Triangle {
     pub(super) fn new(corners: [Vec3; 3]) -> Self {
         let [a, b, c] = from_longest_side(corners, |corner| corner);
@@ -45,6 +48,10 @@ impl Triangle {
         if up.length_squared() < NEEDLE_SQUARED * a.distance_squared(b) {
             // What is left of a needle's apex is rounding, which need not be square to its side.
             up = up.try_normalize().map_or(Vec3::ZERO, aside);
+            // Of rounding that points along the side there is nothing left but rounding again.
+            if up.length_squared() < MOSTLY_ASIDE_SQUARED {
+                up = Vec3::ZERO;
+            }
         }
         let up = up.try_normalize().unwrap_or_else(|| along.any_orthonormal_vector());
         let length = (b - a).dot(along);
@@ -99,6 +106,26 @@ impl Triangle {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What rounding leaves of the apex of a line may point along it.
+    #[test]
+    fn a_line_is_far_from_what_is_far_aside_of_it() {
+        let mut state = 5u32;
+        let mut steps = |most: u32| {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            f32::from((state >> 16) as u16 % most as u16) / 128.0
+        };
+        for _ in 0..20_000 {
+            let a = Vec3::new(steps(60_000), steps(60_000), steps(9_000));
+            let along = Vec3::new(steps(4), steps(4), steps(4) + 1.0 / 128.0);
+            let (near, far) =
+                (1.0 + (steps(40) * 128.0).round(), 50.0 + (steps(900) * 128.0).round());
+            let triangle = Triangle::new([a, a + along * near, a + along * far]);
+            let aside = along.normalize().any_orthonormal_vector() * 30.0;
+            let found = triangle.squared_distance(a + along * (near + far) * 0.5 + aside).sqrt();
+            assert!((found - 30.0).abs() < 0.05, "{found} from {a}, {along}, {near}, {far}");
+        }
+    }
 
     /// Against the nearest of many points of the triangle, none of which is nearer than it is.
     #[test]
