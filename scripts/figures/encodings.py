@@ -6,7 +6,12 @@ import subprocess
 
 from common import ROOT, Options, Programs, machine, real_data, run, say, table, write_between_markers
 
-ENCODINGS = [("plain", []), ("`--compress meshopt`", ["--compress", "meshopt"])]
+ENCODINGS = [
+    ("plain", []),
+    ("`--compress meshopt`", ["--compress", "meshopt"]),
+    ("`--quantize 0.01`", ["--quantize", "0.01"]),
+    ("both", ["--quantize", "0.01", "--compress", "meshopt"]),
+]
 
 
 def main():
@@ -33,7 +38,15 @@ def main():
     )
     print(text)
     if arguments.write:
-        write_between_markers(ROOT / "README.md", "encodings", text)
+        write_between_markers(ROOT / "README.md", "encodings", sizes(rows))
+
+
+def sizes(rows):
+    """The sizes of real data alone: a row for each input, a column for each encoding."""
+    names = [name for name in dict.fromkeys(row[0] for row in rows) if name.startswith("`")]
+    by_place = {(name, encoding): nodes for name, encoding, nodes, *_ in rows}
+    lines = [[name, *(by_place[name, encoding] for encoding, _ in ENCODINGS)] for name in names]
+    return table(["", *(f"{encoding}, MB" for encoding, _ in ENCODINGS)], lines)
 
 
 def measure(programs, name, models, runs):

@@ -65,7 +65,7 @@ async function surfaceColours(url) {
     const glb = parse(await (await fetch(url)).arrayBuffer());
     const { json } = glb;
     const sum = { area: 0, textured: 0, rgb: [0, 0, 0] };
-    if (json.extensionsRequired?.includes('EXT_meshopt_compression')) {
+    if (json.extensionsRequired?.some((name) => /meshopt|quantization/.test(name))) {
         return sum;
     }
     const pictures = await Promise.all((json.images ?? []).map((image) => pixels(glb, image, url)));

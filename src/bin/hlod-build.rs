@@ -161,6 +161,13 @@ struct BuildArgs {
     #[arg(long, value_name = "TEXELS", default_value_t = 4096, help_heading = "Textures")]
     max_atlas: u32,
 
+    /// Round all positions to multiples of a power of two, the largest not above METRES (0.000001 to
+    /// 1000), and store them in 16 bits (KHR_mesh_quantization). Leaves are then the source to half
+    /// a step along each axis, 0.87 steps in all; errors of nodes contain that. 0.01 is a 128th of a
+    /// metre. At least 1000 steps must fit across the city [default: positions as exact as 32-bit
+    /// floats from their block's middle]
+    #[arg(long, value_name = "METRES", help_heading = "Files")]
+    quantize: Option<f64>,
     /// Compress vertices and indices without loss: `meshopt` is EXT_meshopt_compression
     #[arg(long, value_enum, default_value_t = CompressArg::None, help_heading = "Files")]
     compress: CompressArg,
@@ -253,6 +260,7 @@ impl BuildArgs {
             placement: self.placement(),
             jpeg_quality: self.jpeg_quality,
             max_atlas: self.max_atlas,
+            quantize: self.quantize,
             compress: self.compress == CompressArg::Meshopt,
             force: self.force,
             ..Default::default()

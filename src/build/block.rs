@@ -14,6 +14,7 @@ use super::lattice::Lattice;
 use super::options::BuildOptions;
 use super::pipeline::in_parallel;
 use super::progress::Progress;
+use super::quantize::Quantization;
 use super::shared_borders::{keep_shared, shared_positions};
 use super::stages::{Stage, Stages};
 use super::stray::set_strays_aside;
@@ -121,11 +122,34 @@ pub fn build_input(
     progress: &dyn Progress,
 ) -> Result<BuiltInput> {
     let mut warnings = std::mem::take(&mut model.warnings);
+    let quantization = options.quantization();
+    if let Some(quantization) = quantization {
+        let collapsed = stages.time(Stage::Gather, || quantization.snap(&mut model));
+        let (source, step) = (model.source.display(), quantization.step);
+        let what = format!("{source}: triangle thinner than the lattice of {step} m left out");
+        warnings.add(what, collapsed);
+        progress.built(collapsed);
+    }
     fold_untextured(&mut model);
     let plans = plan(&model, options.blocks, options.hierarchy.desired_tris, up);
     let texture_plan = TexturePlan::new(&model);
     let drafts = drafts(&mut model, plans, options, stages);
-    let common = lattice_of(drafts.iter().filter(|draft| !draft.far));
+    let lattice_of = |drafts: &mut dyn Iterator<Item = &Draft>| {
+        let fine = lattice_of(drafts);
+        if let Some(Quantization { step }) = quantization.filter(|coarse| coarse.step < fine.step) {
+            let what = format!(
+                "{}: blocks too large for steps of {step} m; rounded to {} m",
+                model.source.display(),
+                fine.step
+            );
+            return (fine, Some(what));
+        }
+        (fine.or_coarser(quantization), None)
+    };
+    let (common, coarse) = lattice_of(&mut drafts.iter().filter(|draft| !draft.far));
+    if let Some(what) = coarse {
+        warnings.add(what, 1);
+    }
     let shared_vertices = stages.time(Stage::Gather, || {
         let bounds: Vec<_> = drafts.iter().map(|draft| draft.source.bounds()).collect();
         shared_positions(&bounds, |block| drafts[block].source.uncut_positions())
@@ -137,8 +161,14 @@ pub fn build_input(
     );
     let turnable: Vec<bool> = model.materials.iter().map(turnable).collect();
     let prefix = file_prefix(&model.source);
+    let mut hierarchy = options.hierarchy.clone();
+    if quantization.is_some() {
+        // Vertices are beside their planes by steps that show.
+        hierarchy.tolerance.sliver_steps = hierarchy.tolerance.sliver_steps.min(1.0);
+    }
     let built = in_parallel(drafts, |number, draft| {
-        let lattice = if draft.far { lattice_of([&draft]) } else { common };
+        let (lattice, coarse) =
+            if draft.far { lattice_of(&mut [&draft].into_iter()) } else { (common, None) };
         let Draft { name, source, .. } = draft;
         let (low, high) = source.bounds();
         let origin = lattice.origin_near(std::array::from_fn(|i| (low[i] + high[i]) * 0.5));
@@ -148,9 +178,12 @@ pub fn build_input(
                 DraftSource::Piece(piece) => *piece,
             };
             keep_shared(&mut piece, &shared_vertices);
-            localise(piece, origin, lattice)
+            localise(piece, origin, lattice, quantization.is_some())
         });
         let mut warnings = Warnings::default();
+        if let Some(what) = coarse {
+            warnings.add(what, 1);
+        }
         warnings.add(
             format!(
                 "{}: triangle thinner than the precision of its block ({:e} m) left out",
@@ -181,16 +214,20 @@ pub fn build_input(
             prefix: format!("{prefix}-{number:04}"),
             origin,
             up,
-            encoding: Encoding { compress: options.compress },
+            encoding: Encoding {
+                step: quantization.map(|quantization| quantization.step),
+                compress: options.compress,
+            },
             textured_weight: options.textured_weight,
             stages,
             progress,
         };
         let builder = BlockBuilder {
-            options: &options.hierarchy,
+            options: &hierarchy,
             factors,
             bake: textures.bake_plan().filter(|_| has_room_for_charts(options)),
             lattice,
+            quantization,
             up,
             turnable: &turnable,
             sink: &sink,
@@ -252,8 +289,9 @@ fn drafts_of_plan(
         drafts.push(Draft { name, far: false, source: DraftSource::Parts(parts), materials });
         return drafts;
     }
-    let piece = stages.time(Stage::Gather, || gather(materials, &parts));
+    let mut piece = stages.time(Stage::Gather, || gather(materials, &parts));
     drop(parts);
+    piece.moved = options.quantize.map(|_| vec![0.0; piece.mesh.positions.len()]);
     let most = match division {
         Division::Halves { most } => most,
         Division::Whole | Division::Grid { .. } => piece.mesh.triangles.len(),
@@ -261,7 +299,7 @@ fn drafts_of_plan(
     // The blocks' own factors are not known yet; those of the largest serve all.
     let factors = simplifications(most.min(piece.mesh.triangles.len()), &options.hierarchy);
     let shares: Vec<f64> = factors.iter().map(|factor| 1.0 / factor.sqrt()).collect();
-    let pieces = divide(piece, division, &shares, stages);
+    let pieces = divide(piece, division, &shares, options.quantization(), stages);
     let several = pieces.len() > 1;
     for (number, piece) in pieces.into_iter().enumerate() {
         let materials = materials_of(piece.mesh.materials.clone());

@@ -46,6 +46,16 @@ pub struct Piece<C: Coordinate = f32> {
     pub border: Border,
     /// The planes on the way here.
     pub path: Path<C>,
+    /// By how much cuts have moved each vertex off the surface, metres at most; `None` where that is
+    /// too little to be followed.
+    pub moved: Option<Vec<f32>>,
+}
+
+impl<C: Coordinate> Piece<C> {
+    /// The most that cuts have moved any vertex off the surface, metres.
+    pub fn most_moved(&self) -> f64 {
+        self.moved.iter().flatten().copied().fold(0.0, f32::max).into()
+    }
 }
 
 /// Where and how to cut.
@@ -69,20 +79,47 @@ const ABOVE: i8 = 1;
 
 /// Cuts `piece`; either side may be empty of triangles.
 pub fn cut<C: Coordinate>(piece: Piece<C>, cut: &Cut<C>) -> (Piece<C>, Piece<C>) {
-    let Piece { mut mesh, mut border, path } = piece;
+    let Piece { mut mesh, mut border, path, mut moved } = piece;
     let mut labels = label(&mesh, &border, cut);
-    let halves = split(&mut mesh, &mut border, &mut labels, cut);
+    let halves = split(&mut mesh, &mut border, &mut labels, &mut moved, cut);
     let plane = Arc::new(make_plane(&mesh, &border, &labels, &halves, cut));
     let path_below = path.with(Arc::clone(&plane));
     let path_above = path_below.clone();
     let bit = path.len() as u32;
     let shared = shared_positions(&mesh, &labels, &halves);
-    let below = extract(&mesh, &border, &halves.below, &labels, &shared, &plane, bit);
-    let above = extract(&mesh, &border, &halves.above, &labels, &shared, &plane, bit);
-    (
-        Piece { mesh: below.0, border: below.1, path: path_below },
-        Piece { mesh: above.0, border: above.1, path: path_above },
-    )
+    let side = |triangles: &[[u32; 3]], path| {
+        let apart = moved.is_some().then(|| without_collapsed(&mesh, &labels, triangles)).flatten();
+        let triangles = apart.as_deref().unwrap_or(triangles);
+        let (mesh, border, used) =
+            extract(&mesh, &border, triangles, &labels, &shared, &plane, bit);
+        let of_side =
+            |moved: &Vec<f32>| used.iter().map(|&vertex| moved[vertex as usize]).collect();
+        let moved = moved.as_ref().map(of_side);
+        Piece { mesh, border, path, moved }
+    };
+    (side(&halves.below, path_below), side(&halves.above, path_above))
+}
+
+/// Triangles without those of which two corners meet, as rounded crossings may where rounding shows;
+/// `None` where there are none such. Both sides may drop them: of the edges of such a triangle one
+/// has no length, and the others are one. It stays where a vertex beside the plane would be lost.
+fn without_collapsed<C: Coordinate>(
+    mesh: &Mesh<C>,
+    labels: &[i8],
+    triangles: &[[u32; 3]],
+) -> Option<Vec<[u32; 3]>> {
+    let collapsed = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
+        a == b || b == c || c == a
+    };
+    triangles.iter().find(|triangle| collapsed(triangle))?;
+    let mut used = vec![false; mesh.positions.len()];
+    for triangle in triangles.iter().filter(|triangle| !collapsed(triangle)) {
+        triangle.iter().for_each(|&vertex| used[vertex as usize] = true);
+    }
+    let lost = |vertex: u32| labels[vertex as usize] != ON && !used[vertex as usize];
+    let kept = |triangle: &&[u32; 3]| !collapsed(triangle) || triangle.iter().any(|&v| lost(v));
+    Some(triangles.iter().filter(kept).copied().collect())
 }
 
 /// Triangles of the two sides, and the edges along which crossing triangles were split.
@@ -188,6 +225,7 @@ fn split<C: Coordinate>(
     mesh: &mut Mesh<C>,
     border: &mut Border,
     labels: &mut Vec<i8>,
+    moved: &mut Option<Vec<f32>>,
     cut: &Cut<C>,
 ) -> Halves {
     let triangles = std::mem::take(&mut mesh.triangles);
@@ -218,7 +256,7 @@ fn split<C: Coordinate>(
                         labels.push(ON);
                         border.planes.push(0);
                         border.keep.push(0);
-                        push_crossing(mesh, from, to, cut)
+                        push_crossing(mesh, moved, from, to, cut)
                     })
                 };
                 split_triangle(triangle, side, &mut crossing, &mut halves);
@@ -257,22 +295,36 @@ fn split_triangle(
 }
 
 /// Appends the vertex at which an edge crosses the plane.
-fn push_crossing<C: Coordinate>(mesh: &mut Mesh<C>, from: u32, to: u32, cut: &Cut<C>) -> u32 {
+fn push_crossing<C: Coordinate>(
+    mesh: &mut Mesh<C>,
+    moved: &mut Option<Vec<f32>>,
+    from: u32,
+    to: u32,
+    cut: &Cut<C>,
+) -> u32 {
     let (low, high) = if order(mesh, from) <= order(mesh, to) { (from, to) } else { (to, from) };
     let (low, high) = (low as usize, high as usize);
     let start = mesh.positions[low].map(C::wide);
     let end = mesh.positions[high].map(C::wide);
     let t = (cut.coordinate.wide() - start[cut.axis]) / (end[cut.axis] - start[cut.axis]);
     let index = mesh.positions.len() as u32;
-    mesh.positions.push(std::array::from_fn(|i| {
+    let exact = |i: usize| start[i] + (end[i] - start[i]) * t;
+    let position: [C; 3] = std::array::from_fn(|i| {
         if i == cut.axis {
             cut.coordinate
         } else {
-            let exact = start[i] + (end[i] - start[i]) * t;
+            let exact = exact(i);
             // Adding 0 turns -0 into 0.
             C::narrow(cut.lattice.map_or(exact, |lattice| lattice.round(exact)) + 0.0)
         }
-    }));
+    });
+    if let Some(moved) = moved {
+        let off: f64 = (0..3).map(|i| (position[i].wide() - exact(i)).powi(2)).sum::<f64>().sqrt();
+        // The edge may be off the surface already: at its ends, and between them by what is between.
+        let before = f64::from(moved[low]) * (1.0 - t) + f64::from(moved[high]) * t;
+        moved.push(((before + off) as f32).next_up());
+    }
+    mesh.positions.push(position);
     if !mesh.texcoords.is_empty() {
         let (start, end) = (mesh.texcoords[low], mesh.texcoords[high]);
         mesh.texcoords.push(std::array::from_fn(|i| {
@@ -364,7 +416,7 @@ fn make_plane<C: Coordinate>(
     CutPlane::new(cut.axis, cut.coordinate, &vertices, &edges, cut.rule)
 }
 
-/// One side as a mesh of its own.
+/// One side as a mesh of its own, and which vertices it has.
 fn extract<C: Coordinate>(
     mesh: &Mesh<C>,
     border: &Border,
@@ -373,7 +425,7 @@ fn extract<C: Coordinate>(
     shared: &FxHashSet<PositionKey<C>>,
     plane: &CutPlane<C>,
     bit: u32,
-) -> (Mesh<C>, Border) {
+) -> (Mesh<C>, Border, Vec<u32>) {
     let (triangles, used) = renumber(triangles, mesh.positions.len());
     let mut side_border =
         Border { planes: Vec::with_capacity(used.len()), keep: Vec::with_capacity(used.len()) };
@@ -393,5 +445,76 @@ fn extract<C: Coordinate>(
         side_border.planes.push(planes);
         side_border.keep.push(keep);
     }
-    (mesh.with_vertices(&used, triangles), side_border)
+    (mesh.with_vertices(&used, triangles), side_border, used)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::wide;
+
+    /// Cuts triangles over these positions at x = 2 on a lattice of whole metres.
+    fn cut_at_2(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> [Piece; 2] {
+        let mesh = Mesh {
+            positions: positions.to_vec(),
+            materials: vec![0; positions.len()],
+            triangles: triangles.to_vec(),
+            ..Mesh::default()
+        };
+        let border = Border::interior(positions.len());
+        let moved = Some(vec![0.0; positions.len()]);
+        let rule = KeepRule { shares: vec![1.0], most: Vec::new(), first_level: 1, collinear: 0.0 };
+        let how = Cut {
+            axis: 0,
+            coordinate: 2.0,
+            lattice: Some(Lattice { step: 1.0 }),
+            tolerance: CutTolerance { sliver_share: 0.0, sliver_steps: 0.0 },
+            rule: &rule,
+        };
+        let (below, above) = cut(Piece { mesh, border, moved, ..Piece::default() }, &how);
+        [below, above]
+    }
+
+    #[test]
+    fn what_crossings_are_beside_their_edges_is_remembered() {
+        let corners = [[0.0, 0.0, 0.0], [7.0, 3.0, 1.0], [5.0, 9.0, 5.0]];
+        for piece in cut_at_2(&corners, &[[0, 1, 2]]) {
+            let moved = piece.moved.as_ref().unwrap();
+            assert_eq!(moved.len(), piece.mesh.positions.len());
+            for (&position, &moved) in piece.mesh.positions.iter().zip(moved) {
+                let beside = |[from, to]: [[f32; 3]; 2]| {
+                    let (from, along) = (wide(from), wide(to) - wide(from));
+                    let way = wide(position) - from;
+                    (way - along * (2.0 / along.x)).length()
+                };
+                let made = position[0] == 2.0;
+                assert_eq!(made, moved > 0.0);
+                if made {
+                    let edges = [[corners[0], corners[1]], [corners[0], corners[2]]];
+                    let off = edges.map(beside).into_iter().fold(f64::INFINITY, f64::min);
+                    assert!((f64::from(moved) - off).abs() < 1e-6, "{moved}, {off}");
+                }
+            }
+            assert!(piece.most_moved() > 0.1 && piece.most_moved() <= 0.5f64.sqrt());
+        }
+    }
+
+    #[test]
+    fn a_tip_whose_crossings_meet_stays_only_for_its_vertex() {
+        let positions = [
+            [0.0, 0.0, 0.0],
+            [10.0, 1.0, 0.0],
+            [10.0, 0.0, 0.0],
+            [-5.0, 0.0, 0.0],
+            [0.0, 5.0, 0.0],
+        ];
+        let needle = [0, 1, 2];
+        let [alone, _] = cut_at_2(&positions, &[needle]);
+        assert_eq!(alone.mesh.triangles.len(), 1);
+        assert!(alone.mesh.positions.contains(&positions[0]));
+        let [joined, above] = cut_at_2(&positions, &[needle, [0, 4, 3]]);
+        assert_eq!(joined.mesh.triangles.len(), 1);
+        assert_eq!(joined.mesh.area(), 12.5);
+        assert!(!above.mesh.triangles.is_empty());
+    }
 }

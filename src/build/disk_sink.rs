@@ -24,6 +24,8 @@ pub struct NodeRecord {
     pub file_bytes: u64,
     /// Checksum of the file.
     pub file_crc: u32,
+    /// Source coordinates of the file's origin.
+    pub origin: [f64; 3],
     /// From its geometry.
     pub attributes: Attributes,
     /// Bound on the distance to the source, metres; not yet monotone.
@@ -129,6 +131,7 @@ impl NodeSink for DiskSink<'_> {
                 file,
                 file_bytes: bytes.len() as u64,
                 file_crc: file_crc(&bytes),
+                origin: mesh.origin,
                 attributes,
                 geometric_error: node.geometric_error,
                 pictures,

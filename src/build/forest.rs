@@ -18,7 +18,6 @@ pub fn append_nodes(
     nodes: &mut Vec<Node>,
     tree: Tree<NodeRecord>,
     block: u32,
-    origin: [f64; 3],
     shared_numbers: &BTreeMap<String, u32>,
 ) {
     let mut level = vec![(None, vec![tree])];
@@ -35,7 +34,7 @@ pub fn append_nodes(
                     parent.first_child = Some(index);
                 }
                 let next_sibling = (place + 1 < count).then_some(index + 1);
-                nodes.push(node_of(record, parent, next_sibling, block, origin, shared_numbers));
+                nodes.push(node_of(record, parent, next_sibling, block, shared_numbers));
                 if !children.is_empty() {
                     next.push((Some(index), children));
                 }
@@ -50,7 +49,6 @@ fn node_of(
     parent: Option<u32>,
     next_sibling: Option<u32>,
     block: u32,
-    origin: [f64; 3],
     shared_numbers: &BTreeMap<String, u32>,
 ) -> Node {
     let mut shared_textures: Vec<u32> =
@@ -75,7 +73,7 @@ fn node_of(
         geometric_error: record.geometric_error,
         texels: record.own_texels(),
         shared_texels: record.shared.iter().map(|(_, texels)| texels).sum(),
-        origin,
+        origin: record.origin,
         file: record.file,
         file_bytes: record.file_bytes,
         file_crc: record.file_crc,

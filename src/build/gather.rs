@@ -9,6 +9,7 @@ use super::border::{Border, Path};
 use super::chain::{Chain, CutPlane, KeepRule};
 use super::cut::{Cut, CutTolerance, Piece, cut};
 use super::lattice::Lattice;
+use super::quantize::Quantization;
 use super::stages::{Stage, Stages};
 use crate::mesh::{Material, Mesh, Part, PositionKey, color_key, key, texcoord_key};
 
@@ -54,7 +55,7 @@ pub fn gather(materials: &[Material], parts: &[Part]) -> Piece<f64> {
         }
     }
     let border = Border::interior(mesh.positions.len());
-    Piece { mesh, border, path: Path::default() }
+    Piece { mesh, border, ..Piece::default() }
 }
 
 /// Cuts a gathered piece into the blocks of a [`Division`], in a fixed order.
@@ -62,22 +63,24 @@ pub fn divide(
     piece: Piece<f64>,
     division: Division,
     shares: &[f64],
+    quantization: Option<Quantization>,
     stages: &Stages,
 ) -> Vec<Piece<f64>> {
+    let lattice = quantization.map(|Quantization { step }| Lattice { step });
     let rule =
         KeepRule { shares: shares.to_vec(), most: Vec::new(), first_level: 0, collinear: 0.0 };
     let mut done = Vec::new();
     match division {
         Division::Whole => done.push(piece),
-        Division::Halves { most } => return halves(piece, most, &rule, stages),
+        Division::Halves { most } => return halves(piece, most, &rule, lattice, stages),
         Division::Grid { metres, axes } => {
             let mut stack = vec![piece];
             while let Some(piece) = stack.pop() {
                 match grid_line(&piece.mesh, metres, axes).filter(|_| piece.path.len() < 40) {
                     None => done.push(piece),
                     Some((axis, line)) => {
-                        let (below, above) =
-                            stages.time(Stage::Gather, || cut_at(piece, axis, line, &rule));
+                        let (below, above) = stages
+                            .time(Stage::Gather, || cut_at(piece, axis, line, &rule, lattice));
                         if below.mesh.triangles.is_empty() || above.mesh.triangles.is_empty() {
                             // Everything was on one side but for a vertex within tolerance.
                             done.extend(
@@ -95,7 +98,13 @@ pub fn divide(
 }
 
 /// Halves a piece across its longest side until no part of it has more than `most` triangles.
-fn halves(piece: Piece<f64>, most: usize, rule: &KeepRule, stages: &Stages) -> Vec<Piece<f64>> {
+fn halves(
+    piece: Piece<f64>,
+    most: usize,
+    rule: &KeepRule,
+    lattice: Option<Lattice>,
+    stages: &Stages,
+) -> Vec<Piece<f64>> {
     let triangles = piece.mesh.triangles.len();
     if triangles == 0 {
         return Vec::new();
@@ -106,19 +115,31 @@ fn halves(piece: Piece<f64>, most: usize, rule: &KeepRule, stages: &Stages) -> V
     let side = |axis: usize| high[axis] - low[axis];
     let axis = (1..3).fold(0, |best, axis| if side(axis) > side(best) { axis } else { best });
     let middle = stages.time(Stage::Gather, || median_of_triangles(&piece.mesh, axis));
+    let middle = lattice.map_or(middle, |lattice| lattice.round(middle));
     if !(middle > low[axis] && middle < high[axis]) || piece.path.len() >= 12 {
         return vec![piece];
     }
-    let (below, above) = stages.time(Stage::Gather, || cut_at(piece, axis, middle, rule));
-    let (mut done, above) =
-        rayon::join(|| halves(below, most, rule, stages), || halves(above, most, rule, stages));
+    let (below, above) = stages.time(Stage::Gather, || cut_at(piece, axis, middle, rule, lattice));
+    let (mut done, above) = rayon::join(
+        || halves(below, most, rule, lattice, stages),
+        || halves(above, most, rule, lattice, stages),
+    );
     done.extend(above);
     done
 }
 
-fn cut_at(piece: Piece<f64>, axis: usize, at: f64, rule: &KeepRule) -> (Piece<f64>, Piece<f64>) {
-    let tolerance = CutTolerance::default();
-    cut(piece, &Cut { axis, coordinate: at, lattice: None, tolerance, rule })
+fn cut_at(
+    piece: Piece<f64>,
+    axis: usize,
+    at: f64,
+    rule: &KeepRule,
+    lattice: Option<Lattice>,
+) -> (Piece<f64>, Piece<f64>) {
+    // As within blocks, where the lattice shows: source vertices that the plane runs through are on
+    // it, and what meets when it is rounded meets here.
+    let coordinate = lattice.map_or(at, |lattice| lattice.round(at));
+    let tolerance = CutTolerance { sliver_steps: 1.0, ..CutTolerance::default() };
+    cut(piece, &Cut { axis, coordinate, lattice, tolerance, rule })
 }
 
 /// The coordinate that halves the triangles by their centres.
@@ -148,12 +169,24 @@ fn grid_line(mesh: &Mesh<f64>, metres: f64, axes: [usize; 2]) -> Option<(usize, 
 }
 
 /// Brings a piece to its block's origin and lattice; triangles that collapse on the lattice are
-/// dropped and counted.
-pub fn localise(piece: Piece<f64>, origin: [f64; 3], lattice: Lattice) -> (Piece, u64) {
+/// dropped and counted. Where `follow` says so, the piece remembers how far vertices were moved.
+pub fn localise(
+    piece: Piece<f64>,
+    origin: [f64; 3],
+    lattice: Lattice,
+    follow: bool,
+) -> (Piece, u64) {
     let local = |position: [f64; 3]| -> [f32; 3] {
         std::array::from_fn(|i| lattice.offset(position[i], origin[i]) + 0.0)
     };
-    let Piece { mesh, border, path: wide_path } = piece;
+    let Piece { mesh, border, path: wide_path, moved } = piece;
+    let moved = follow.then(|| {
+        let off = |p: &[f64; 3]| {
+            p.map(|c| (lattice.round(c) - c).powi(2)).iter().sum::<f64>().sqrt() as f32
+        };
+        let before = moved.into_iter().flatten().chain(std::iter::repeat(0.0));
+        mesh.positions.iter().zip(before).map(|(at, before)| (before + off(at)).next_up()).collect()
+    });
     let mut mesh = Mesh {
         positions: mesh.positions.iter().map(|&position| local(position)).collect(),
         texcoords: mesh.texcoords,
@@ -182,5 +215,5 @@ pub fn localise(piece: Piece<f64>, origin: [f64; 3], lattice: Lattice) -> (Piece
         let coordinate = lattice.offset(plane.coordinate, origin[plane.axis]);
         path = path.with(Arc::new(CutPlane::from_chains(plane.axis, coordinate, chains)));
     }
-    (Piece { mesh, border, path }, dropped)
+    (Piece { mesh, border, path, moved }, dropped)
 }

@@ -6,6 +6,8 @@
 //! a position is an exact f32 offset from the block's origin, whatever the origin is, and every
 //! sum and difference of offsets along an axis is exact too.
 
+use super::quantize::Quantization;
+
 /// Bits of a coordinate: offsets stay below 2^23 steps, so that sums of two are exact in f32.
 const OFFSET_BITS: i32 = 23;
 
@@ -26,10 +28,22 @@ impl Lattice {
         Self { step: 2f64.powi(exponent.max(finest).max(-100)) }
     }
 
+    /// This lattice, or that of a quantised build where it is coarser. Of two powers of two the
+    /// larger one's multiples are multiples of the other.
+    pub fn or_coarser(self, quantization: Option<Quantization>) -> Self {
+        Self { step: quantization.map_or(self.step, |coarse| coarse.step.max(self.step)) }
+    }
+
     /// A coordinate rounded to the lattice.
     pub fn round(&self, coordinate: f64) -> f64 {
         // A power of two: both multiplications are exact.
         (coordinate / self.step).round() * self.step
+    }
+
+    /// The lattice point nearest to an offset from an origin on the lattice.
+    pub fn nearest(&self, offset: [f32; 3]) -> [f32; 3] {
+        // Adding 0 turns -0 into 0.
+        offset.map(|coordinate| self.round(coordinate.into()) as f32 + 0.0)
     }
 
     /// An origin near `point`: on the lattice, and exactly representable in f32, since glTF

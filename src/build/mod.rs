@@ -24,6 +24,7 @@ pub mod merge;
 pub mod options;
 pub mod pipeline;
 pub mod progress;
+pub mod quantize;
 pub mod remnant;
 pub mod reuse;
 pub mod seamless;

@@ -2,6 +2,7 @@
 
 use super::blocks::BlockMode;
 use super::hierarchy::HierarchyOptions;
+use super::quantize::{Quantization, STEPS};
 use crate::mesh::UpAxis;
 use crate::place::Placement;
 use crate::report::shortest;
@@ -22,6 +23,8 @@ pub struct BuildOptions {
     pub jpeg_quality: u8,
     /// Longest side of an atlas in texels, 16–65535.
     pub max_atlas: u32,
+    /// Round positions to a power of two not above this many metres, and store them in 16 bits.
+    pub quantize: Option<f64>,
     /// Compress vertices and indices without loss.
     pub compress: bool,
     /// Weight of textured triangles in the cost (`c_textured`), 0–1.
@@ -39,6 +42,7 @@ impl Default for BuildOptions {
             placement: Placement::Local,
             jpeg_quality: 85,
             max_atlas: 4096,
+            quantize: None,
             compress: false,
             textured_weight: super::attributes::TEXTURED_WEIGHT,
             force: false,
@@ -61,7 +65,14 @@ impl BuildOptions {
         range("desired triangles", f64::from(hierarchy.desired_tris), 1.0, 1e9)?;
         range("JPEG quality", f64::from(self.jpeg_quality), 1.0, 100.0)?;
         range("largest atlas", f64::from(self.max_atlas), 16.0, 65535.0)?;
-        range("textured weight", self.textured_weight, 0.0, 1.0)
+        range("textured weight", self.textured_weight, 0.0, 1.0)?;
+        let [least, most] = STEPS;
+        self.quantize.map_or(Ok(()), |metres| range("quantization step", metres, least, most))
+    }
+
+    /// The lattice of a quantised build, of options that were checked.
+    pub fn quantization(&self) -> Option<Quantization> {
+        self.quantize.map(Quantization::not_above)
     }
 
     /// The parameters that the result depends on, for `scene.hlod` and `build.json`.
@@ -82,6 +93,9 @@ impl BuildOptions {
             "max_atlas": self.max_atlas,
             "textured_weight": self.textured_weight,
         });
+        if let Some(quantization) = self.quantization() {
+            quantization.note(&mut parameters);
+        }
         if self.compress {
             parameters["compress"] = "meshopt".into();
         }

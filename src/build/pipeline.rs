@@ -13,17 +13,18 @@ use super::forest::{append_nodes, make_errors_monotone};
 use super::inputs::{describe, fingerprint, text_of, unchanged};
 use super::options::{BuildOptions, placement_of};
 use super::progress::Progress;
+use super::quantize::Quantization;
 use super::reuse::Earlier;
 use super::simplify::{BUDGET_TOLERANCE, LadderStep};
 use super::stages::{Stage, Stages};
 use crate::format::{
-    BlockInfo, NODES_DIR, OutputDir, REPORT_FILE, SCENE_FILE, Scene, SharedTexture, TEXTURES_DIR,
-    check_apart,
+    BlockInfo, NODES_DIR, Node, OutputDir, REPORT_FILE, SCENE_FILE, Scene, SharedTexture,
+    TEXTURES_DIR, check_apart, fits_in_steps,
 };
 use crate::mesh::{Model, UpAxis, Warnings};
 use crate::place::{Globe, z_up};
 use crate::report::build_report::{
-    Baked, BuildReport, Count, FileReport, InputReport, OverBudget, StageReport, UpFrom,
+    Baked, BuildReport, Count, FileReport, InputReport, OverBudget, Quantized, StageReport, UpFrom,
     level_reports,
 };
 use crate::texture::{BakeReason, SharedTextures};
@@ -116,6 +117,12 @@ pub fn build(
             (None, None) => (super::up::guess(&model), UpFrom::Shape),
         };
         check_place(&model, up, globe.as_ref())?;
+        if let Some(quantization) = options.quantization() {
+            quantization.check(&model)?;
+            if inputs.len() == 1 {
+                quantization.check_extent(model.bounds())?;
+            }
+        }
         let ((built, files), read_ahead) = rayon::join(
             || {
                 rayon::join(
@@ -178,6 +185,9 @@ pub fn build(
     let up = agreed_up(&reports, &mut warnings);
     let scene = scene_of(blocks, shared_textures, parameters.clone(), up, &reports)?;
 
+    if let Some(quantization) = options.quantization() {
+        quantization.check_extent(bounds(&scene))?;
+    }
     // As whoever reads the scene will see it.
     let placement = placement_of(&scene.parameters)?;
     let mut tilesets = Vec::new();
@@ -191,6 +201,7 @@ pub fn build(
             levels[node.level as usize].over_budget += 1;
         }
     }
+    let quantized = options.quantization().map(|quantization| quantized(&scene, quantization));
     let report = BuildReport {
         version: env!("CARGO_PKG_VERSION").into(),
         parameters,
@@ -205,6 +216,7 @@ pub fn build(
         outcomes: most_frequent(reports.iter().flat_map(|input| &input.outcomes).cloned()),
         inputs: reports,
         tilesets,
+        quantized,
         over_budget,
         baked,
         warnings: Count::of_warnings(&warnings),
@@ -213,6 +225,27 @@ pub fn build(
     output.write(REPORT_FILE, report.to_json()?.as_bytes())?;
     output.commit()?;
     Ok(Outcome::Built(report))
+}
+
+/// Least and greatest coordinates of a scene.
+fn bounds(scene: &Scene) -> [[f64; 3]; 2] {
+    let empty = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    scene.nodes.iter().fold(empty, |[low, high], node| {
+        [
+            std::array::from_fn(|axis| low[axis].min(node.bbox_min[axis])),
+            std::array::from_fn(|axis| high[axis].max(node.bbox_max[axis])),
+        ]
+    })
+}
+
+fn quantized(scene: &Scene, quantization: Quantization) -> Quantized {
+    let Quantization { step } = quantization;
+    let is_large = |node: &&Node| !fits_in_steps(node.bbox_min, node.bbox_max, step);
+    Quantized {
+        step_metres: step,
+        bound_metres: quantization.bound(),
+        large_nodes: scene.nodes.iter().filter(is_large).count() as u64,
+    }
 }
 
 /// Refuses coordinates that cannot be of the place that was asked for.
@@ -322,7 +355,7 @@ fn scene_of(
     let mut infos: Vec<BlockInfo> = Vec::with_capacity(blocks.len());
     for mut block in blocks {
         make_errors_monotone(&mut block.tree);
-        append_nodes(&mut nodes, block.tree, infos.len() as u32, block.info.origin, &numbers);
+        append_nodes(&mut nodes, block.tree, infos.len() as u32, &numbers);
         infos.push(block.info);
     }
     if nodes.is_empty() {

@@ -120,6 +120,7 @@ impl Earlier {
                 file: node.file.clone(),
                 file_bytes: node.file_bytes,
                 file_crc: node.file_crc,
+                origin: node.origin,
                 attributes: Attributes {
                     triangles: node.triangles,
                     textured_triangles: node.textured_triangles,

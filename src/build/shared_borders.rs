@@ -74,7 +74,7 @@ pub fn keep_shared(piece: &mut Piece<f64>, shared: &FxHashSet<PositionKey<f64>>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::build::border::{Border, Fate, Path};
+    use crate::build::border::{Border, Fate};
     use crate::mesh::Mesh;
 
     #[test]
@@ -89,7 +89,7 @@ mod tests {
         assert!(shared.contains(&key([1.0, 0.0, 0.0])));
 
         let mesh = Mesh { positions: blocks[0].clone(), ..Mesh::default() };
-        let mut piece = Piece { mesh, border: Border::interior(4), path: Path::<f64>::default() };
+        let mut piece = Piece { mesh, border: Border::interior(4), ..Piece::default() };
         keep_shared(&mut piece, &shared);
         let fate = |vertex: usize, level| {
             piece.path.fate(piece.border.planes[vertex], piece.border.keep[vertex], level)

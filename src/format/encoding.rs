@@ -1,17 +1,27 @@
-//! How a node's geometry is stored: plain or compressed.
+//! How a node's geometry is stored: plain, in steps or compressed.
 
 use super::node_mesh::{NodeMesh, Primitive};
+use super::quantized::{place, round_texcoords};
 
 /// How a node's geometry is stored. The default is a form that all viewers read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Encoding {
+    /// Positions that are multiples of this many metres, a power of two, are stored in 16 bits
+    /// (`KHR_mesh_quantization`), and so are texture coordinates within 0–1.
+    pub step: Option<f64>,
     /// Vertices and indices are compressed without loss (`EXT_meshopt_compression`).
     pub compress: bool,
 }
 
 impl Encoding {
-    /// Orders a mesh as it is stored best.
+    /// Gives a mesh the origin and order that it is stored best with, and rounds texture coordinates
+    /// that are stored in 16 bits. Positions stay where they are.
     pub fn prepare(&self, mesh: &mut NodeMesh) {
+        if let Some(step) = self.step {
+            place(mesh, step);
+            let NodeMesh { images, primitives, .. } = mesh;
+            primitives.iter_mut().for_each(|primitive| round_texcoords(primitive, images));
+        }
         if self.compress {
             mesh.primitives.iter_mut().for_each(order);
         }
@@ -54,7 +64,7 @@ mod tests {
     #[test]
     fn ordering_keeps_every_triangle() {
         let mut ordered = mesh();
-        Encoding { compress: true }.prepare(&mut ordered);
+        Encoding { step: None, compress: true }.prepare(&mut ordered);
         for (before, after) in mesh().primitives.iter().zip(&ordered.primitives) {
             let corners = |p: &Primitive| {
                 let of_triangle = |corners: &[u32]| {

@@ -11,6 +11,7 @@ use super::file_name::is_plain_file_name;
 use super::glb_packed::decode;
 use super::glb_schema::{self as schema, *};
 use super::node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
+use super::quantized::{from_share, from_steps};
 use crate::mesh::{AlphaMode, Wrap};
 use crate::{Error, Result};
 
@@ -47,8 +48,8 @@ fn parse(bytes: &[u8]) -> Parsed<NodeMesh> {
         }
     };
     let spent = vec![false; root.buffer_views.len()];
-    let mut reader = Reader { root: &root, bin: buffer(&root, bin)?, spent };
-    let origin = origin(node)?;
+    let (origin, step) = placement(node)?;
+    let mut reader = Reader { root: &root, bin: buffer(&root, bin)?, step, spent };
     let primitives = primitives
         .iter()
         .zip(0..)
@@ -122,22 +123,35 @@ fn is_sound(buffers: &[Buffer]) -> bool {
     })
 }
 
-/// The local origin in source coordinates, from the one or the other form that is written.
-fn origin(node: &Placement) -> Parsed<[f64; 3]> {
-    let origin = match (node.translation, node.matrix) {
-        (Some(translation), None) => translation,
-        (None, Some(matrix)) if matrix[..12] == Z_UP && matrix[15] == 1.0 => {
-            [matrix[12], -matrix[14], matrix[13]]
+/// The local origin in source coordinates, from the one or the other form that is written, and the
+/// length of a step.
+fn placement(node: &Placement) -> Parsed<([f64; 3], f32)> {
+    let single = |value: f64| value as f32;
+    let (translation, scale) =
+        (node.translation.map(|t| t.map(single)), node.scale.map(|s| s.map(single)));
+    let matrix = node.matrix.map(|matrix| matrix.map(single));
+    let is_step = |step: f32| step > 0.0 && step.is_finite();
+    let (origin, step) = match (translation, scale, matrix) {
+        (Some(translation), None, None) => (translation, 1.0),
+        (Some(translation), Some(scale), None) if is_step(scale[0]) && scale == [scale[0]; 3] => {
+            (translation, scale[0])
         }
-        (translation, matrix) => {
+        (None, None, Some(matrix))
+            if is_step(matrix[0])
+                && matrix[..12] == Z_UP.map(|entry| entry as f32 * matrix[0])
+                && matrix[15] == 1.0 =>
+        {
+            ([matrix[12], -matrix[14], matrix[13]], matrix[0])
+        }
+        (translation, scale, matrix) => {
             return Err(format!(
-                "expected a translation, or a matrix that turns Z up into Y up, found \
-                 {translation:?} and {matrix:?}"
+                "expected a translation and one scale, or a matrix that turns Z up into Y up, \
+                 found {translation:?}, {scale:?} and {matrix:?}"
             ));
         }
     };
     finite("origin", &origin)?;
-    Ok(origin.map(f64::from))
+    Ok((origin.map(f64::from), step))
 }
 
 fn finite(what: &str, values: &[f32]) -> Parsed<()> {
@@ -155,6 +169,8 @@ fn entry<'a, T>(list: &'a [T], what: &str, index: usize) -> Parsed<&'a T> {
 struct Reader<'a> {
     root: &'a Root,
     bin: &'a [u8],
+    /// The length of a step; 1 where positions are metres.
+    step: f32,
     /// The buffer views that have been read. Each is read once, so that a small file cannot ask
     /// for the same bytes again and again.
     spent: Vec<bool>,
@@ -163,18 +179,17 @@ struct Reader<'a> {
 impl<'a> Reader<'a> {
     fn primitive(&mut self, primitive: &schema::Primitive) -> Parsed<Primitive> {
         let schema::Primitive { attributes, indices, material } = primitive;
-        let positions: Vec<[f32; 3]> =
-            self.read(attributes.position, "positions", Shape::Vec3, FLOAT, triple)?;
+        let positions = self.positions(attributes.position)?;
         finite("positions", positions.as_flattened())?;
         let texcoords: Vec<[f32; 2]> = match attributes.texcoord {
-            Some(accessor) => {
-                self.read(accessor, "texture coordinates", Shape::Vec2, FLOAT, pair)?
-            }
+            Some(accessor) => self.texcoords(accessor)?,
             None => Vec::new(),
         };
         finite("texture coordinates", texcoords.as_flattened())?;
         let colors: Vec<[u16; 4]> = match attributes.color {
-            Some(accessor) => self.read(accessor, "colours", Shape::Vec4, UNSIGNED_SHORT, quad)?,
+            Some(accessor) => {
+                self.read(accessor, "colours", Shape::Vec4, UNSIGNED_SHORT, true, quad)?
+            }
             None => Vec::new(),
         };
         let vertices = positions.len();
@@ -192,14 +207,47 @@ impl<'a> Reader<'a> {
         Ok(Primitive { positions, texcoords, colors, indices, surface })
     }
 
+    /// Metres, or steps that a fourth number fills up to 8 bytes.
+    fn positions(&mut self, accessor: usize) -> Parsed<Vec<[f32; 3]>> {
+        let what = "positions";
+        let Accessor { component_type, buffer_view, .. } =
+            *entry(&self.root.accessors, what, accessor)?;
+        let stride = entry(&self.root.buffer_views, what, buffer_view)?.byte_stride;
+        match (component_type, stride) {
+            (UNSIGNED_SHORT, Some(8)) => {
+                let step = self.step;
+                let position = |bytes: &[u8; 8]| {
+                    let [x, y, z, _] = quad(bytes);
+                    from_steps([x, y, z], step)
+                };
+                self.read(accessor, what, Shape::Vec3, UNSIGNED_SHORT, false, position)
+            }
+            (UNSIGNED_SHORT, stride) => {
+                Err(format!("{what}: expected 8 bytes from one to the next, found {stride:?}"))
+            }
+            _ if self.step != 1.0 => Err(format!("{what}: expected steps of {} m", self.step)),
+            _ => self.read(accessor, what, Shape::Vec3, FLOAT, false, triple),
+        }
+    }
+
+    fn texcoords(&mut self, accessor: usize) -> Parsed<Vec<[f32; 2]>> {
+        let what = "texture coordinates";
+        let short =
+            |&[a, b, c, d]: &[u8; 4]| [[a, b], [c, d]].map(u16::from_le_bytes).map(from_share);
+        match entry(&self.root.accessors, what, accessor)?.component_type {
+            UNSIGNED_SHORT => self.read(accessor, what, Shape::Vec2, UNSIGNED_SHORT, true, short),
+            _ => self.read(accessor, what, Shape::Vec2, FLOAT, false, pair),
+        }
+    }
+
     fn indices(&mut self, accessor: usize, vertices: usize) -> Parsed<Vec<u32>> {
         let what = "indices";
         let indices: Vec<u32> = if vertices <= MOST_SHORT_VERTICES {
             let short = |bytes: &[u8; 2]| u32::from(u16::from_le_bytes(*bytes));
-            self.read(accessor, what, Shape::Scalar, UNSIGNED_SHORT, short)?
+            self.read(accessor, what, Shape::Scalar, UNSIGNED_SHORT, false, short)?
         } else {
             let long = |bytes: &[u8; 4]| u32::from_le_bytes(*bytes);
-            self.read(accessor, what, Shape::Scalar, UNSIGNED_INT, long)?
+            self.read(accessor, what, Shape::Scalar, UNSIGNED_INT, false, long)?
         };
         if indices.is_empty() || !indices.len().is_multiple_of(3) {
             return Err(format!("expected whole triangles, found {} corners", indices.len()));
@@ -217,6 +265,7 @@ impl<'a> Reader<'a> {
         what: &str,
         shape: Shape,
         component_type: u32,
+        normalized: bool,
         element: impl Fn(&[u8; N]) -> T,
     ) -> Parsed<Vec<T>> {
         let accessor = entry(&self.root.accessors, what, accessor)?;
@@ -226,7 +275,7 @@ impl<'a> Reader<'a> {
                 accessor.shape, accessor.component_type
             ));
         }
-        if accessor.normalized != (shape == Shape::Vec4) {
+        if accessor.normalized != normalized {
             return Err(format!("{what}: found normalized {}", accessor.normalized));
         }
         let bytes = self.view(accessor.buffer_view, what)?;

@@ -21,6 +21,7 @@ pub(super) const CLAMP_TO_EDGE: u32 = 33071;
 pub(super) const MIRRORED_REPEAT: u32 = 33648;
 pub(super) const REPEAT: u32 = 10497;
 pub(super) const UNLIT: &str = "KHR_materials_unlit";
+pub(super) const QUANTIZATION: &str = "KHR_mesh_quantization";
 pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
 
 /// Most vertices that u16 indices can refer to: glTF reserves 0xFFFF.
@@ -28,7 +29,7 @@ pub(super) const MOST_SHORT_VERTICES: usize = 0xFFFF;
 
 /// Turns Z up into Y up, (x, y, z) → (x, z, −y), column by column; the last column is added by
 /// [`Placement`]. As a matrix it is exact; as a quaternion √½ would be rounded.
-pub(super) const Z_UP: [f32; 12] = [1., 0., 0., 0., 0., 0., -1., 0., 0., 1., 0., 0.];
+pub(super) const Z_UP: [f64; 12] = [1., 0., 0., 0., 0., 0., -1., 0., 0., 1., 0., 0.];
 
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
@@ -78,12 +79,17 @@ pub(super) struct SceneRoots {
 pub(super) struct Placement {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<usize>,
-    /// Where Y is up.
+    /// Where Y is up. All numbers fit in f32, but are written with all their digits: most readers
+    /// take them for f64, and nodes must not be shifted against each other.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub translation: Option<[f32; 3]>,
-    /// Where Z is up: [`Z_UP`] and the translation.
+    pub translation: Option<[f64; 3]>,
+    /// The length of a step, where positions are in steps and Y is up.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub matrix: Option<[f32; 16]>,
+    pub scale: Option<[f64; 3]>,
+    /// Where Z is up: [`Z_UP`], times the length of a step where positions are in steps, and the
+    /// translation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub matrix: Option<[f64; 16]>,
     pub extras: Extras,
 }
 

@@ -41,13 +41,38 @@ fn reads_back_what_it_wrote_bit_for_bit() {
     }
 }
 
+/// A mesh on a lattice of a quarter, as a quantised build makes it.
+fn mesh_in_quarters() -> NodeMesh {
+    let mut mesh = mesh();
+    for position in mesh.primitives.iter_mut().flat_map(|primitive| &mut primitive.positions) {
+        *position = position.map(|coordinate| (coordinate * 4.0).round() / 4.0 + 100.0);
+    }
+    mesh.primitives[0].texcoords = vec![[0.0, 1.0 / 3.0], [1.0, 0.1], [1.0, 1.0], [0.0, 0.7]];
+    mesh
+}
+
+const QUARTERS: Encoding = Encoding { step: Some(0.25), compress: false };
+
+/// Its file.
+fn file_in_quarters(up: UpAxis) -> Vec<u8> {
+    let mut mesh = mesh_in_quarters();
+    QUARTERS.prepare(&mut mesh);
+    write_glb_encoded(&mesh, up, LABEL, QUARTERS).unwrap()
+}
+
+fn json_of(bytes: &[u8]) -> serde_json::Value {
+    serde_json::from_slice(&bytes[20..20 + json_length(bytes)]).unwrap()
+}
+
 /// Every encoding gives back what was prepared for it; compression may turn triangles.
 #[test]
 fn encodings_lose_nothing_that_was_prepared() {
     for up in [UpAxis::Y, UpAxis::Z] {
-        for compress in [false, true] {
-            let encoding = Encoding { compress };
-            let mut mesh = mesh();
+        for (step, compress) in
+            [(None, false), (None, true), (Some(0.25), false), (Some(0.25), true)]
+        {
+            let encoding = Encoding { step, compress };
+            let mut mesh = if step.is_some() { mesh_in_quarters() } else { mesh() };
             encoding.prepare(&mut mesh);
             let bytes = write_glb_encoded(&mesh, up, LABEL, encoding).unwrap();
             let mut back = read(&bytes).unwrap();
@@ -62,10 +87,103 @@ fn encodings_lose_nothing_that_was_prepared() {
                 found.indices.clone_from(&expected.indices);
             }
             assert_eq!(back, mesh, "{encoding:?}");
-            let json: serde_json::Value =
-                serde_json::from_slice(&bytes[20..20 + json_length(&bytes)]).unwrap();
-            let required = json["extensionsRequired"].to_string();
+            assert_eq!(bits(&back), bits(&mesh), "{encoding:?}");
+            let required = json_of(&bytes)["extensionsRequired"].to_string();
             assert_eq!(required.contains("EXT_meshopt_compression"), compress);
+            assert_eq!(required.contains("KHR_mesh_quantization"), step.is_some());
+        }
+    }
+}
+
+/// Positions are where they were, in integers of 16 bits, 8 bytes apart, and bounded as stored.
+#[test]
+fn steps_are_stored_as_gltf_wants_them() {
+    let (before, mut mesh) = (mesh_in_quarters(), mesh_in_quarters());
+    QUARTERS.prepare(&mut mesh);
+    for (one, other) in before.primitives.iter().zip(&mesh.primitives) {
+        for (one, other) in one.positions.iter().zip(&other.positions) {
+            for axis in 0..3 {
+                let place = |mesh: &NodeMesh, p: &[f32; 3]| mesh.origin[axis] + f64::from(p[axis]);
+                assert_eq!(place(&before, one), place(&mesh, other));
+            }
+        }
+    }
+    for up in [UpAxis::Y, UpAxis::Z] {
+        let json = json_of(&file_in_quarters(up));
+        let attributes = &json["meshes"][0]["primitives"][0]["attributes"];
+        let accessor = |name: &str| &json["accessors"][attributes[name].as_u64().unwrap() as usize];
+        let positions = accessor("POSITION");
+        assert_eq!(positions["componentType"], 5123);
+        assert_eq!(positions["normalized"], serde_json::Value::Null);
+        let view = &json["bufferViews"][positions["bufferView"].as_u64().unwrap() as usize];
+        assert_eq!((view["byteStride"].as_u64(), view["byteLength"].as_u64()), (Some(8), Some(32)));
+        for bound in ["min", "max"] {
+            for steps in positions[bound].as_array().unwrap() {
+                let steps = steps.as_f64().unwrap();
+                assert!(steps.fract() == 0.0 && (0.0..=65535.0).contains(&steps));
+            }
+        }
+        let texcoords = accessor("TEXCOORD_0");
+        assert_eq!(
+            (&texcoords["componentType"], &texcoords["normalized"]),
+            (&5123.into(), &true.into())
+        );
+        let repeated = &json["meshes"][0]["primitives"][1]["attributes"]["TEXCOORD_0"];
+        let repeated = &json["accessors"][repeated.as_u64().unwrap() as usize];
+        assert_eq!(repeated["componentType"], 5126, "beyond 0 to 1");
+        let node = &json["nodes"][0];
+        assert_eq!(node["scale"].is_array(), up == UpAxis::Y);
+        let number = |list: &serde_json::Value, at: usize| list[at].as_f64().unwrap();
+        let origin = match up {
+            UpAxis::Y => [0, 1, 2].map(|at| number(&node["translation"], at)),
+            UpAxis::Z => [12, 14, 13].map(|at| number(&node["matrix"], at)),
+        };
+        assert_eq!(origin.map(f64::abs), mesh.origin.map(f64::abs), "with all digits");
+    }
+}
+
+/// What has no place in 16 bits keeps 32, in a file that needs no extension.
+#[test]
+fn what_does_not_fit_in_steps_keeps_32_bits() {
+    let mut wide = mesh_in_quarters();
+    wide.primitives[0].positions[0][1] = 20_000.0;
+    for mut mesh in [wide, mesh()] {
+        let before = mesh.clone();
+        QUARTERS.prepare(&mut mesh);
+        assert_eq!(mesh.origin, before.origin);
+        let bytes = write_glb_encoded(&mesh, UpAxis::Z, LABEL, QUARTERS).unwrap();
+        assert!(!json_of(&bytes)["extensionsUsed"].to_string().contains("KHR_mesh_quantization"));
+        assert_eq!(read(&bytes).unwrap(), mesh);
+    }
+}
+
+#[test]
+fn lies_about_steps_are_refused() {
+    let (upright, turned) = (file_in_quarters(UpAxis::Y), file_in_quarters(UpAxis::Z));
+    let cases = [
+        (&upright, "\"scale\":[0.25", "\"scale\":[0.5", "one scale"),
+        (&upright, "\"scale\":[0.25,0.25,0.25]", "\"scale\":[0,0,0]", "one scale"),
+        (&upright, "\"scale\":[0.25,0.25,0.25]", "\"scale\":[1e38,1e38,1e38]", "finite"),
+        (&upright, "\"byteStride\":8,", "\"byteStride\":12,", "8 bytes from one"),
+        (&upright, "\"byteStride\":8,", "", "8 bytes from one"),
+        (&upright, "\"normalized\":true,", "", "normalized false"),
+        (&upright, "\"componentType\":5123,", "\"componentType\":5126,", "expected steps"),
+        (&turned, "\"matrix\":[0.25", "\"matrix\":[0.5", "a matrix that turns"),
+    ];
+    for (bytes, from, to, words) in cases {
+        let message = read(&edit(bytes, from, to)).unwrap_err().to_string();
+        assert!(message.contains(words), "{to}: expected {words:?}, found {message}");
+    }
+}
+
+#[test]
+fn a_flipped_bit_in_a_quantised_file_is_an_error_or_another_sound_mesh() {
+    let bytes = file_in_quarters(UpAxis::Z);
+    for bit in 0..bytes.len() * 8 {
+        let mut flipped = bytes.clone();
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        if let Ok(mesh) = read(&flipped) {
+            drop(write_glb(&mesh, UpAxis::Z, LABEL).unwrap());
         }
     }
 }
@@ -77,7 +195,7 @@ fn json_length(bytes: &[u8]) -> usize {
 /// A byte that is wrong gives an error or another mesh, never a panic or much memory.
 #[test]
 fn damaged_compressed_files_do_no_harm() {
-    let encoding = Encoding { compress: true };
+    let encoding = Encoding { step: None, compress: true };
     let mut mesh = mesh();
     encoding.prepare(&mut mesh);
     let bytes = write_glb_encoded(&mesh, UpAxis::Z, LABEL, encoding).unwrap();

@@ -6,6 +6,7 @@ use super::file_name::is_plain_file_name;
 use super::glb_packed::{encode_triangles, encode_vertices};
 use super::glb_schema::{self as schema, *};
 use super::node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
+use super::quantized::{in_shares, in_steps, is_in_steps};
 use crate::mesh::{AlphaMode, UpAxis, Wrap};
 use crate::{Error, Result};
 
@@ -39,8 +40,12 @@ pub fn write_glb_encoded(
     label: NodeLabel,
     encoding: Encoding,
 ) -> Result<Vec<u8>> {
+    // One transform for all primitives: all are in steps or none is.
+    let steps = encoding.step.filter(|&step| is_in_steps(mesh, step));
     let mut writer = Writer {
         compress: encoding.compress,
+        steps,
+        short_texcoords: encoding.step.is_some(),
         unpacked: 0,
         root: Root {
             asset: Asset {
@@ -51,7 +56,7 @@ pub fn write_glb_encoded(
             extensions_required: Vec::new(),
             scene: 0,
             scenes: vec![SceneRoots { nodes: vec![0] }],
-            nodes: vec![placement(mesh, up, label)?],
+            nodes: vec![placement(mesh, up, steps, label)?],
             meshes: Vec::new(),
             materials: Vec::new(),
             textures: Vec::new(),
@@ -102,25 +107,32 @@ fn bin_size(mesh: &NodeMesh) -> usize {
     geometry + pictures
 }
 
-fn placement(mesh: &NodeMesh, up: UpAxis, label: NodeLabel) -> Result<Placement> {
+fn placement(
+    mesh: &NodeMesh,
+    up: UpAxis,
+    steps: Option<f64>,
+    label: NodeLabel,
+) -> Result<Placement> {
     let origin = mesh.origin.map(|coordinate| coordinate as f32);
     if mesh.origin.iter().zip(origin).any(|(&exact, single)| f64::from(single) != exact) {
         return Err(broken(format!("origin {:?}: expected to fit in 32 bits", mesh.origin)));
     }
-    let [x, y, z] = origin;
-    let (translation, matrix) = match up {
-        UpAxis::Y => (Some(origin), None),
+    let origin @ [x, y, z] = mesh.origin;
+    let (translation, scale, matrix) = match up {
+        UpAxis::Y => (Some(origin), steps.map(|step| [step; 3]), None),
         UpAxis::Z => {
             let mut matrix = [0.0; 16];
-            matrix[..12].copy_from_slice(&Z_UP);
+            // Adding 0 turns -0 into 0.
+            matrix[..12].copy_from_slice(&Z_UP.map(|entry| entry * steps.unwrap_or(1.0) + 0.0));
             matrix[12..].copy_from_slice(&[x, z, -y, 1.0]);
-            (None, Some(matrix))
+            (None, None, Some(matrix))
         }
     };
     let NodeLabel { id, level } = label;
     Ok(Placement {
         mesh: (!mesh.primitives.is_empty()).then_some(0),
         translation,
+        scale,
         matrix,
         extras: Extras { id, level },
     })
@@ -165,6 +177,10 @@ struct Writer {
     root: Root,
     bin: Vec<u8>,
     compress: bool,
+    /// The length of the steps that positions are stored in.
+    steps: Option<f64>,
+    /// Texture coordinates are stored in 16 bits where nothing is lost.
+    short_texcoords: bool,
     /// Bytes that compressed views have without compression.
     unpacked: usize,
 }
@@ -173,25 +189,8 @@ impl Writer {
     fn primitive(&mut self, primitive: &Primitive) -> schema::Primitive {
         let Primitive { positions, texcoords, colors, indices, surface } = primitive;
         let vertices = positions.len();
-        let position = self.vertices(vertices, FLOAT, Shape::Vec3, 12, |bin| {
-            extend(bin, positions.as_flattened(), f32::to_le_bytes);
-        });
-        let (min, max) = positions.iter().fold(
-            ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]),
-            |(min, max): ([f32; 3], [f32; 3]), p| {
-                (
-                    std::array::from_fn(|axis| min[axis].min(p[axis])),
-                    std::array::from_fn(|axis| max[axis].max(p[axis])),
-                )
-            },
-        );
-        self.root.accessors[position].min = Some(min);
-        self.root.accessors[position].max = Some(max);
-        let texcoord = (!texcoords.is_empty()).then(|| {
-            self.vertices(vertices, FLOAT, Shape::Vec2, 8, |bin| {
-                extend(bin, texcoords.as_flattened(), f32::to_le_bytes);
-            })
-        });
+        let position = self.positions(positions);
+        let texcoord = (!texcoords.is_empty()).then(|| self.texcoords(texcoords));
         let color = (!colors.is_empty()).then(|| {
             let accessor = self.vertices(vertices, UNSIGNED_SHORT, Shape::Vec4, 8, |bin| {
                 extend(bin, colors.as_flattened(), u16::to_le_bytes);
@@ -223,6 +222,50 @@ impl Writer {
         }
     }
 
+    fn positions(&mut self, positions: &[[f32; 3]]) -> usize {
+        let (min, max) = positions.iter().fold(
+            ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]),
+            |(min, max): ([f32; 3], [f32; 3]), p| {
+                (
+                    std::array::from_fn(|axis| min[axis].min(p[axis])),
+                    std::array::from_fn(|axis| max[axis].max(p[axis])),
+                )
+            },
+        );
+        let vertices = positions.len();
+        let (accessor, unit) = match self.steps {
+            Some(step) => {
+                let steps = in_steps(positions, step);
+                let accessor = self.vertices(vertices, UNSIGNED_SHORT, Shape::Vec3, 8, |bin| {
+                    extend(bin, steps.as_flattened(), u16::to_le_bytes);
+                });
+                (accessor, step as f32)
+            }
+            None => {
+                let accessor = self.vertices(vertices, FLOAT, Shape::Vec3, 12, |bin| {
+                    extend(bin, positions.as_flattened(), f32::to_le_bytes);
+                });
+                (accessor, 1.0)
+            }
+        };
+        self.root.accessors[accessor].min = Some(min.map(|least| least / unit));
+        self.root.accessors[accessor].max = Some(max.map(|most| most / unit));
+        accessor
+    }
+
+    fn texcoords(&mut self, texcoords: &[[f32; 2]]) -> usize {
+        let Some(shares) = self.short_texcoords.then(|| in_shares(texcoords)).flatten() else {
+            return self.vertices(texcoords.len(), FLOAT, Shape::Vec2, 8, |bin| {
+                extend(bin, texcoords.as_flattened(), f32::to_le_bytes);
+            });
+        };
+        let accessor = self.vertices(texcoords.len(), UNSIGNED_SHORT, Shape::Vec2, 4, |bin| {
+            extend(bin, shares.as_flattened(), u16::to_le_bytes);
+        });
+        self.root.accessors[accessor].normalized = true;
+        accessor
+    }
+
     /// Adds an accessor of vertices of `stride` bytes with a buffer view of its own.
     fn vertices(
         &mut self,
@@ -232,16 +275,23 @@ impl Writer {
         stride: usize,
         fill: impl FnOnce(&mut Vec<u8>),
     ) -> usize {
-        if self.compress {
+        let accessor = if self.compress {
             let mut bytes = Vec::with_capacity(count * stride);
             fill(&mut bytes);
             if let Some(packed) = encode_vertices(&bytes, stride) {
                 let view = self.packed(&packed, count, stride, Mode::Attributes);
                 return self.push_accessor(view, count, component_type, shape);
             }
-            return self.accessor(count, component_type, shape, |bin| bin.extend(bytes));
+            self.accessor(count, component_type, shape, |bin| bin.extend(bytes))
+        } else {
+            self.accessor(count, component_type, shape, fill)
+        };
+        // Without a stride vertices follow each other closely: true but of those in steps.
+        if (component_type, shape) == (UNSIGNED_SHORT, Shape::Vec3) {
+            let view = self.root.accessors[accessor].buffer_view;
+            self.root.buffer_views[view].byte_stride = Some(stride);
         }
-        self.accessor(count, component_type, shape, fill)
+        accessor
     }
 
     /// Adds a compressed buffer view.
@@ -387,6 +437,9 @@ impl Writer {
             self.root.extensions_used.push(extension.into());
             self.root.extensions_required.push(extension.into());
         };
+        if self.steps.is_some() && !self.root.meshes.is_empty() {
+            require(QUANTIZATION);
+        }
         if self.unpacked > 0 {
             require(MESHOPT);
             self.root.buffers.push(Buffer {

@@ -22,6 +22,7 @@ mod node_mesh;
 mod output_dir;
 #[cfg(test)]
 mod output_dir_tests;
+mod quantized;
 mod scene;
 mod scene_check;
 mod scene_read;
@@ -39,6 +40,7 @@ pub use glb_read::read_glb;
 pub use glb_write::{NodeLabel, write_glb, write_glb_encoded};
 pub use node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 pub use output_dir::{OutputDir, check_apart};
+pub use quantized::fits_in_steps;
 pub use scene::{BlockInfo, Children, Node, Scene, SharedTexture};
 pub use scene_check::{Element, SceneDefect};
 

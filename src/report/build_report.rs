@@ -34,6 +34,9 @@ pub struct BuildReport {
     /// no tileset.
     #[serde(default)]
     pub tilesets: Vec<FileReport>,
+    /// How far positions were rounded; `None` where they are the source's to the digits of f32.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quantized: Option<Quantized>,
     /// Nodes that have more triangles than their budget allows, in order of id.
     pub over_budget: Vec<OverBudget>,
     /// Nodes with textures of their own instead of the source's charts, in order of id.
@@ -74,6 +77,17 @@ pub struct FileReport {
     pub bytes: u64,
     /// BLAKE3 of its contents, in hexadecimal; empty where it was not there.
     pub blake3: String,
+}
+
+/// The rounding of a quantised build.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Quantized {
+    /// Positions are multiples of it; a power of two.
+    pub step_metres: f64,
+    /// Farthest that a vertex of the source may be from where a leaf has it.
+    pub bound_metres: f64,
+    /// Nodes that are larger than 16 bits reach: their positions take 32 bits.
+    pub large_nodes: u64,
 }
 
 /// How it is known which axis points at the sky.

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::build_report::{BuildReport, UpFrom};
+use super::build_report::{BuildReport, Quantized, UpFrom};
 use crate::build::options::placement_of;
 use crate::place::Placement;
 
@@ -53,6 +53,18 @@ pub fn built(report: &BuildReport, out: &Path) -> String {
         report.peak_memory_bytes as f64 / 1e6
     );
     let _ = writeln!(text, "  {}", orientation(report));
+    if let Some(quantized) = &report.quantized {
+        let Quantized { step_metres, bound_metres, large_nodes } = quantized;
+        let _ = write!(
+            text,
+            "  positions in steps of {step_metres} m: within {bound_metres:.2e} m of the source's"
+        );
+        let _ = match large_nodes {
+            0 => writeln!(text),
+            1 => writeln!(text, "; 1 node is too large for 16 bits"),
+            _ => writeln!(text, "; {large_nodes} nodes are too large for 16 bits"),
+        };
+    }
     let stages: Vec<String> = report
         .stages
         .iter()

@@ -8,6 +8,7 @@ use super::placed::place;
 use super::regions::root;
 use super::tile::Tile;
 use super::{TILESET_FILE, TILESETS_DIR, VERSION};
+use crate::build::quantize::Quantization;
 use crate::format::Scene;
 use crate::place::Placement;
 use crate::{Error, Result};
@@ -47,6 +48,10 @@ pub(super) fn files_of(
         "up": scene.up,
         "parameters": scene.parameters,
     });
+    if let Some(quantization) = Quantization::of(&scene.parameters) {
+        extras["quantized"] =
+            json!({ "step_metres": quantization.step, "bound_metres": quantization.bound() });
+    }
     if let Some(globe) = placement.globe()? {
         let beyond = || Error::Usage("coordinates have no place on the Earth".into());
         let residual = place(&mut root, &globe).ok_or_else(beyond)?;

@@ -5,6 +5,7 @@ use super::distance::NodeDistances;
 use super::faithful::rounding;
 use super::options::Limits;
 use super::report::{Check, ErrorFigures};
+use crate::build::quantize::Quantization;
 use crate::format::Scene;
 
 /// Compares stored and measured errors of all coarse nodes. What leaves may be off by rounding is
@@ -17,12 +18,14 @@ pub(super) fn errors(
 ) -> (Option<ErrorFigures>, Check) {
     let mut check = Check::new("stored errors");
     let mut ratios: Vec<f64> = Vec::with_capacity(nodes.len());
+    let lattice = Quantization::of(&scene.parameters);
     let mut too_small: Vec<(f64, String, String)> = Vec::new();
     for measured in nodes {
         let node = &scene.nodes[measured.node as usize];
         let rounding = rounding(scene, measured.node, steps[measured.node as usize]);
         let (stored, max) = (node.geometric_error, measured.max());
-        ratios.push(stored.max(rounding) / max.max(rounding));
+        let least = lattice.map_or(rounding, |lattice| lattice.bound());
+        ratios.push(stored.max(least) / max.max(least));
         if stored + rounding < max {
             let at = if measured.to_front.max() >= measured.to_source.max() {
                 (measured.to_front.farthest(), "the source is", "the front")

@@ -1,5 +1,6 @@
 //! Check: the leaves together are the source, in area, vertices and surface.
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::assembly::Assembly;
@@ -9,13 +10,16 @@ use super::points::Points;
 use super::progress::Progress;
 use super::report::{Check, LeafFigures};
 use super::sample::area;
+use super::seams::Seam;
 use super::source::Source;
+use crate::build::quantize::Quantization;
 use crate::format::Scene;
 
 /// How far a point of a leaf may be from the source for rounding, metres: half a step along each
 /// axis for the rounding of source vertices, and as much again for each cut on the way to the
 /// leaf, since a cut rounds the vertices that it makes. Of a coarse node: the bound of the leaves
-/// on its scene's last level.
+/// on its scene's last level. Where the scene is quantised, errors contain the rounding: then a
+/// leaf's error is its bound, where that is less, a coarse node's has room for skirts alone.
 pub(super) fn rounding(scene: &Scene, node: u32, step: f64) -> f64 {
     let factor = scene.parameters["level_factor"].as_u64().unwrap_or(4).clamp(2, 64);
     let cuts_each = factor.next_power_of_two().ilog2();
@@ -23,11 +27,22 @@ pub(super) fn rounding(scene: &Scene, node: u32, step: f64) -> f64 {
         leaf if leaf.first_child.is_none() => leaf.level,
         _ => scene.level_count().saturating_sub(1) as u32,
     };
-    step * (0.5 * f64::from(1 + level * cuts_each) + LAST_BITS) * 3f64.sqrt()
+    let bound = step * (0.5 * f64::from(1 + level * cuts_each) + LAST_BITS) * 3f64.sqrt();
+    match (Quantization::of(&scene.parameters), &scene.nodes[node as usize]) {
+        (None, _) => bound,
+        (Some(_), leaf) if leaf.first_child.is_none() => {
+            bound.min(leaf.geometric_error + step * LAST_BITS)
+        }
+        (Some(_), _) => step * (SKIRTS + LAST_BITS),
+    }
 }
 
 /// Room for the last bits of f64 in coordinates, as a share of a step.
 const LAST_BITS: f64 = 1e-3;
+/// How far the skirts of a quantised scene reach beyond what they cover, in steps: one along and one
+/// across, and what their corners are rounded. In planes in which the source has walls they count as
+/// surface.
+const SKIRTS: f64 = 2.25;
 /// Vertices that one thread looks for in one go.
 const CHUNK: usize = 4096;
 
@@ -40,6 +55,7 @@ pub(super) fn faithful(
     source: &Source,
     leaves: &[u32],
     geometry: &[NodeGeometry],
+    seams: &[Seam],
     points: &Points,
     steps: &[f64],
     limits: &Limits,
@@ -61,14 +77,28 @@ pub(super) fn faithful(
         vertex_bound: finest * 0.5 * 3f64.sqrt(),
         ..LeafFigures::default()
     };
-    figures.area_difference = (figures.leaf_area / figures.source_area - 1.0).abs();
-    let room = limits.area + rounded_area(source, coarsest) / figures.source_area;
+    // Where the lattice is known, so is what becomes of the source on it.
+    let lattice = Quantization::of(&scene.parameters).filter(|known| known.step == coarsest);
+    if lattice.is_some() {
+        let rounded = source.built();
+        figures.rounded_area = Some(
+            (0..rounded.triangles().len() as u32)
+                .map(|triangle| area(rounded.corners(triangle)))
+                .sum(),
+        );
+    }
+    let (expected_area, of_rounding) = match figures.rounded_area {
+        Some(area) => (area, seams.iter().map(|seam| seam.length() * coarsest).sum()),
+        None => (figures.source_area, rounded_area(source, coarsest)),
+    };
+    figures.area_difference = (figures.leaf_area / expected_area - 1.0).abs();
+    let room = limits.area + of_rounding / expected_area;
     if figures.area_difference.is_nan() || figures.area_difference > room {
-        let LeafFigures { source_area, leaf_area, area_difference, .. } = figures;
+        let LeafFigures { leaf_area, area_difference, .. } = figures;
         check.fail(
             "all leaves",
             format!(
-                "area {leaf_area:.6} m² instead of the source's {source_area:.6} m²: off by \
+                "area {leaf_area:.6} m² instead of the source's {expected_area:.6} m²: off by \
                  {area_difference:.1e}, limit {room:.0e}"
             ),
             HINT,
@@ -76,9 +106,24 @@ pub(super) fn faithful(
     }
 
     progress.phase("looking for vertices", surface.positions().len() as u64);
-    let sought = sought_vertices(source, coarsest.min(2.0 * finest));
+    let sought = match lattice {
+        Some(lattice) => sought_vertices(source, |a, b| {
+            (0..3).any(|axis| lattice.round(a[axis]) != lattice.round(b[axis]))
+        }),
+        None => {
+            let step = coarsest.min(2.0 * finest);
+            sought_vertices(source, |a, b| (a - b).abs().max_element() > step)
+        }
+    };
     let found = |vertex: usize| {
         let point = surface.positions()[vertex];
+        if let Some(lattice) = lattice {
+            let place = DVec3::from(point.to_array().map(|c| lattice.round(c)));
+            return assembly.surface.within(place, finest * LAST_BITS).iter().any(|hit| {
+                assembly.surface.corners(hit.triangle).contains(&place)
+                    && (place - point).length() <= lattice.bound() * (1.0 + LAST_BITS)
+            });
+        }
         [finest, coarsest].iter().any(|step| {
             let reach = step * (0.5 + LAST_BITS) * 3f64.sqrt();
             assembly.surface.within(point, reach).iter().any(|hit| {
@@ -168,14 +213,13 @@ fn rounded_area(source: &Source, step: f64) -> f64 {
     thin + 3.0 * f64::sqrt(squares)
 }
 
-/// Vertices of triangles whose corners stay apart on a lattice of `step`. The build leaves out
-/// triangles that do not, and says so; what they alone use is not expected in the leaves.
-fn sought_vertices(source: &Source, step: f64) -> Vec<bool> {
+/// Vertices of triangles whose corners stay apart when rounded. The build leaves out triangles
+/// that do not, and says so; what they alone use is not expected in the leaves.
+fn sought_vertices(source: &Source, apart: impl Fn(DVec3, DVec3) -> bool) -> Vec<bool> {
     let surface = &source.surface;
     let mut sought = vec![false; surface.positions().len()];
     for (number, triangle) in (0..).zip(surface.triangles()) {
         let [a, b, c] = surface.corners(number);
-        let apart = |a: glam::DVec3, b: glam::DVec3| (a - b).abs().max_element() > step;
         if apart(a, b) && apart(b, c) && apart(c, a) {
             triangle.iter().for_each(|&vertex| sought[vertex as usize] = true);
         }

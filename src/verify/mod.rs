@@ -66,6 +66,7 @@ use node_look::NodePictures;
 use points::Points;
 use source::Source;
 
+use crate::build::quantize::Quantization;
 use crate::format::{SCENE_FILE, Scene};
 use crate::{Error, Result};
 
@@ -122,7 +123,13 @@ impl Verification<'_> {
         let Self { out, scene, options, progress } = *self;
         let source = match sources {
             [] => None,
-            sources => Some(Source::load(sources, progress)?),
+            sources => {
+                let mut source = Source::load(sources, progress)?;
+                if let Some(lattice) = Quantization::of(&scene.parameters) {
+                    source.round(lattice);
+                }
+                Some(source)
+            }
         };
         report.source = source.as_ref().map(Source::names).unwrap_or_default();
         let (mut geometry, check) = structure::structure(out, scene, &options.limits, progress);
@@ -143,8 +150,9 @@ impl Verification<'_> {
         progress.phase("pictures of the leaves", leaves.len() as u64);
         let shown = appearance::leaf_colors(&leaves, &points, &pictures, || progress.done(1));
         let reference = match &source {
-            Some(source) => self
-                .against_source(source, &leaves, &geometry, &rims, &points, &steps, &shown, report),
+            Some(source) => self.against_source(
+                source, &leaves, &geometry, &rims, &seams, &points, &steps, &shown, report,
+            ),
             None => Reference { color: shown.clone(), tile: Vec::new() },
         };
         self.levels(
@@ -159,8 +167,15 @@ impl Verification<'_> {
             report,
         );
         drop(source);
-        let (figures, check) =
-            gaps::gaps(scene, &geometry, &seams, &rims.open(), &steps, &options.limits, progress);
+        let (figures, check) = gaps::gaps(
+            scene,
+            &geometry,
+            &seams,
+            &rims.open(),
+            &step::fine_steps(scene),
+            &options.limits,
+            progress,
+        );
         report.gaps = figures;
         report.checks.push(check);
         Ok(())
@@ -173,6 +188,7 @@ impl Verification<'_> {
         leaves: &[u32],
         geometry: &[NodeGeometry],
         rims: &seams::Rims,
+        seams: &[seams::Seam],
         points: &Points,
         steps: &[f64],
         shown: &[Option<look::Color>],
@@ -180,8 +196,9 @@ impl Verification<'_> {
     ) -> Reference {
         let Self { scene, options, progress, .. } = *self;
         let limits = &options.limits;
-        let (mut figures, check) =
-            faithful::faithful(scene, source, leaves, geometry, points, steps, limits, progress);
+        let (mut figures, check) = faithful::faithful(
+            scene, source, leaves, geometry, seams, points, steps, limits, progress,
+        );
         report.checks.push(check);
         report.checks.push(joints::joints(scene, source, rims, steps));
         progress.phase("pictures of the source", 1);

@@ -63,7 +63,8 @@ pub struct Limits {
     pub wrong_tiles: f64,
     /// Likewise for a single leaf: a few of its samples may lie where JPEG spoiled the number.
     pub leaf_wrong_tiles: f64,
-    /// Gap that counts as none, in steps of the lattice: corners of skirts are rounded to it.
+    /// Gap that counts as none, in steps of the lattice that f32 has over the extent: corners of
+    /// skirts are rounded to it.
     pub gap_steps: f64,
 }
 

@@ -121,9 +121,11 @@ pub struct Failure {
 pub struct LeafFigures {
     /// Area of the source, square metres.
     pub source_area: f64,
+    /// The same with all vertices rounded to the lattice of a quantised scene; `None` for others.
+    pub rounded_area: Option<f64>,
     /// Area of all leaves, square metres.
     pub leaf_area: f64,
-    /// `|leaf_area / source_area - 1|`.
+    /// `|leaf_area / source_area - 1|`, for a quantised scene against `rounded_area`.
     pub area_difference: f64,
     /// Vertices of the source.
     pub source_vertices: u64,

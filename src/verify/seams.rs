@@ -21,6 +21,13 @@ pub(super) struct Seam {
     pub leaves: [u32; 2],
 }
 
+impl Seam {
+    /// Its length, metres.
+    pub fn length(&self) -> f64 {
+        self.ends[0].distance(self.ends[1])
+    }
+}
+
 /// An edge that is not between just two triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RimEdge {

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::look::Look;
 use super::progress::Progress;
 use super::seams::open_edges;
+use crate::build::quantize::Quantization;
 use crate::import::{find_inputs, load};
 use crate::mesh::Surface;
 use crate::mesh::{Model, TextureSource};
@@ -17,6 +18,8 @@ use crate::{Error, Result};
 pub(super) struct Source {
     /// All triangles.
     pub surface: Surface,
+    /// The same with vertices rounded to the lattice of a quantised scene.
+    rounded: Option<Surface>,
     models: Vec<Model>,
     parts: Vec<PartPlace>,
     /// Number of each model's first picture.
@@ -62,7 +65,19 @@ impl Source {
         }
         let surface = Surface::new(positions, triangles);
         progress.done(1);
-        Ok(Self { surface, models, parts, first_picture })
+        Ok(Self { surface, rounded: None, models, parts, first_picture })
+    }
+
+    /// Makes it known on what lattice the scene lies.
+    pub fn round(&mut self, lattice: Quantization) {
+        let rounded = |at: &DVec3| at.to_array().map(|c| lattice.round(c)).into();
+        let positions = self.surface.positions().iter().map(rounded).collect();
+        self.rounded = Some(Surface::new(positions, self.surface.triangles().to_vec()));
+    }
+
+    /// The surface as the scene has it: rounded where that is known.
+    pub fn built(&self) -> &Surface {
+        self.rounded.as_ref().unwrap_or(&self.surface)
     }
 
     /// The files, as given or found.

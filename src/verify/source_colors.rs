@@ -82,11 +82,11 @@ pub(super) fn source_colors(
 }
 
 fn candidates(source: &Source, point: DVec3, normal: DVec3, reach: f64) -> Vec<Look> {
-    let surface = &source.surface;
+    let surface = source.built();
     let hits = surface.within(point, reach);
     let aligned = |triangle: u32| {
         let other = cross(surface.corners(triangle));
-        normal.dot(other) >= ALIGNED * normal.length() * other.length()
+        other != DVec3::ZERO && normal.dot(other) >= ALIGNED * normal.length() * other.length()
     };
     hits.into_iter()
         .filter(|hit| aligned(hit.triangle))

@@ -4,15 +4,28 @@ use std::collections::BTreeMap;
 
 use super::tree::line;
 use crate::build::lattice::Lattice;
+use crate::build::quantize::Quantization;
 use crate::format::Scene;
 
 /// For each node the step of its lattice in metres. Source coordinates are rounded to multiples of
 /// it: by half a step at most along each axis.
 ///
-/// The step is not stored. It follows from the largest extent of a block and the largest
+/// A quantised build's step is among the parameters. Otherwise, or where blocks are too large for
+/// that, it is not stored. It follows from the largest extent of a block and the largest
 /// coordinate of an input, as [`Lattice::for_extent`] says; a block of strays has its own. Where
 /// an extent is a power of two to a millionth, the result may be twice the real step.
 pub(super) fn steps(scene: &Scene) -> Vec<f64> {
+    let quantization = Quantization::of(&scene.parameters);
+    fine_lattices(scene).into_iter().map(|fine| fine.or_coarser(quantization).step).collect()
+}
+
+/// The same without regard to quantisation: how closely nodes meet whatever the lattice is, since
+/// all of them lie on it.
+pub(super) fn fine_steps(scene: &Scene) -> Vec<f64> {
+    fine_lattices(scene).into_iter().map(|fine| fine.step).collect()
+}
+
+fn fine_lattices(scene: &Scene) -> Vec<Lattice> {
     let roots: Vec<u32> = (0..scene.nodes.len() as u32)
         .map(|node| line(scene, node).last().unwrap_or(node))
         .collect();
@@ -47,7 +60,7 @@ pub(super) fn steps(scene: &Scene) -> Vec<f64> {
         .iter()
         .map(|&root| {
             let [extent, magnitude] = groups.get(&group_of(root)).copied().unwrap_or_default();
-            Lattice::for_extent(extent * (1.0 + 1e-6), magnitude).step
+            Lattice::for_extent(extent * (1.0 + 1e-6), magnitude)
         })
         .collect()
 }

@@ -5,7 +5,7 @@ pub mod rays;
 
 use std::sync::Mutex;
 
-use hlod::build::border::{Border, Path};
+use hlod::build::border::Border;
 use hlod::build::cut::Piece;
 use hlod::build::hierarchy::{
     BlockBuilder, HierarchyOptions, NodeDraft, NodeSink, Tree, simplifications,
@@ -113,8 +113,8 @@ pub fn block(mesh: Mesh<f64>) -> (Piece, Lattice) {
     let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
     let lattice = Lattice::for_extent(extent, extent);
     let border = Border::interior(mesh.positions.len());
-    let piece = Piece { mesh, border, path: Path::default() };
-    (hlod::build::gather::localise(piece, [0.0; 3], lattice).0, lattice)
+    let piece = Piece { mesh, border, ..Piece::default() };
+    (hlod::build::gather::localise(piece, [0.0; 3], lattice, false).0, lattice)
 }
 
 /// A node as the sink saw it.
@@ -161,6 +161,7 @@ pub fn build(piece: Piece, lattice: Lattice, options: &HierarchyOptions) -> Vec<
         factors,
         bake: None,
         lattice,
+        quantization: None,
         up: hlod::mesh::UpAxis::Z,
         turnable: &[true],
         sink: &sink,

@@ -1,4 +1,4 @@
-//! Compressed files are smaller and hold what they promise.
+//! Compressed and quantised files are smaller and hold what they promise.
 
 use std::fs;
 
@@ -7,7 +7,12 @@ use hlod::city::{self, CityOptions, TextureSize};
 use crate::support::inputs::small_city;
 use crate::support::run_build;
 
-const ENCODINGS: [&[&str]; 2] = [&[], &["--compress", "meshopt"]];
+const ENCODINGS: [&[&str]; 4] = [
+    &[],
+    &["--compress", "meshopt"],
+    &["--quantize", "0.01"],
+    &["--quantize", "0.01", "--compress", "meshopt"],
+];
 
 #[test]
 fn every_encoding_is_verified_against_the_source_and_smaller_than_plain() {
@@ -30,7 +35,8 @@ fn every_encoding_is_verified_against_the_source_and_smaller_than_plain() {
             let nodes = fs::read_dir(folder.path().join(&out).join("nodes")).unwrap();
             sizes.push(nodes.map(|node| node.unwrap().metadata().unwrap().len()).sum::<u64>());
         }
-        let [plain, compressed] = sizes[..] else { unreachable!() };
+        let [plain, compressed, quantized, both] = sizes[..] else { unreachable!() };
         assert!(compressed < plain * 7 / 10, "{sizes:?}");
+        assert!(quantized < plain * 95 / 100 && both < compressed * 8 / 10, "{sizes:?}");
     }
 }

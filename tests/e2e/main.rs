@@ -12,6 +12,7 @@ mod golden;
 mod incremental;
 mod output;
 mod paths;
+mod quantize;
 mod real_data;
 mod seams;
 mod soups;

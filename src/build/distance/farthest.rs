@@ -31,8 +31,9 @@ const BISECTIONS: usize = 10;
 const SCOUTS: usize = 64;
 
 /// The distance of the farthest of the points of `mesh` that are tried, or `least` where none is
-/// farther. No point at all is [`ALLOWANCE`] times as far, as far as divisions go.
-pub(super) fn farthest(mesh: &Mesh, grid: &TriangleGrid, least: f32) -> f32 {
+/// farther. No point at all is [`ALLOWANCE`] times as far, as far as divisions go, of which there
+/// are `effort` times as many as usual.
+pub(super) fn farthest(mesh: &Mesh, grid: &TriangleGrid, least: f32, effort: usize) -> f32 {
     let mut search = Search { grid, largest: least, last: 0 };
     let at = |vertex: u32| Vec3::from(mesh.positions[vertex as usize]);
     // Scouts, evenly spread, find about how large the largest is; the others need then hardly be
@@ -43,7 +44,7 @@ pub(super) fn farthest(mesh: &Mesh, grid: &TriangleGrid, least: f32) -> f32 {
     let corners: Vec<Corner> =
         mesh.positions.iter().map(|&position| search.measure(position.into())).collect();
     let corner = |vertex: u32| corners[vertex as usize];
-    let most = |least: usize| (mesh.triangles.len() / TRIANGLES_PER_DIVISION).max(least);
+    let most = |least: usize| effort * (mesh.triangles.len() / TRIANGLES_PER_DIVISION).max(least);
     let sides = sides(&mesh.triangles, mesh.positions.len());
     let sides = sides.into_iter().map(|side| side.map(corner));
     search.look_at(sides, ends_of_side, most(DIVISIONS_OF_SIDES));

@@ -26,12 +26,17 @@ pub const ALLOWANCE: f64 = 2.0;
 
 /// A bound on the two-sided distance between two meshes over the same surface, metres.
 pub fn hausdorff(source: &Mesh, simplified: &Mesh) -> f64 {
+    hausdorff_with(source, simplified, 1)
+}
+
+/// [`hausdorff`] with so many times as many divisions: for surfaces that come back less exactly.
+pub fn hausdorff_with(source: &Mesh, simplified: &Mesh, effort: usize) -> f64 {
     if source.triangles.is_empty() || simplified.triangles.is_empty() {
         return 0.0;
     }
     let rounding = rounding(source).max(rounding(simplified));
-    let worst = farthest(source, &TriangleGrid::new(simplified), rounding);
-    let worst = farthest(simplified, &TriangleGrid::new(source), worst);
+    let worst = farthest(source, &TriangleGrid::new(simplified), rounding, effort);
+    let worst = farthest(simplified, &TriangleGrid::new(source), worst, effort);
     if worst > rounding { f64::from(worst) * ALLOWANCE } else { 0.0 }
 }
 
