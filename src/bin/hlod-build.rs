@@ -15,7 +15,7 @@ use hlod::build::simplify::Simplifier;
 use hlod::build::{BuildOptions, Outcome, build};
 use hlod::format::Scene;
 use hlod::mesh::UpAxis;
-use hlod::place::Placement;
+use hlod::place::{Place, Placement};
 use hlod::report::{build_summary, inspect};
 use hlod::texture::Seams;
 use hlod::verify::{self, VerifyOptions, verify};
@@ -135,8 +135,9 @@ struct BuildArgs {
     up: Option<UpArg>,
 
     /// The coordinate reference system of the coordinates, as EPSG:CODE: projected, in metres or
-    /// feet. Puts tileset.json on the globe
-    #[arg(long, value_name = "EPSG:CODE", conflicts_with = "origin", help_heading = "Place")]
+    /// feet, or in degrees (longitude, latitude, height in metres), with --origin. Puts tileset.json
+    /// on the globe
+    #[arg(long, value_name = "EPSG:CODE", help_heading = "Place")]
     crs: Option<CrsArg>,
     /// Metres to add to the heights of --crs to make them heights over the ellipsoid: the height
     /// of the geoid where they are over sea level
@@ -150,7 +151,8 @@ struct BuildArgs {
     )]
     height_offset: f64,
     /// Longitude and latitude in degrees and height over the ellipsoid of the coordinates' origin,
-    /// where these are metres east, north and up
+    /// where these are metres east, north and up. With --crs of degrees: the place, near the model,
+    /// around which it is built in such metres
     #[arg(long, value_name = "LON,LAT,HEIGHT", allow_hyphen_values = true, help_heading = "Place")]
     origin: Option<OriginArg>,
 
@@ -271,8 +273,13 @@ impl BuildArgs {
 impl BuildArgs {
     fn placement(&self) -> Placement {
         match (self.crs, self.origin) {
-            (Some(CrsArg(epsg)), _) => Placement::Crs { epsg, height_offset: self.height_offset },
-            (None, Some(OriginArg([lon, lat, height]))) => Placement::Origin { lon, lat, height },
+            (Some(CrsArg(epsg)), None) => {
+                Placement::Crs { epsg, height_offset: self.height_offset }
+            }
+            (Some(CrsArg(epsg)), Some(OriginArg(origin))) => {
+                Placement::Degrees { epsg, height_offset: self.height_offset, origin }
+            }
+            (None, Some(OriginArg(origin))) => Placement::Origin(origin),
             (None, None) => Placement::Local,
         }
     }
@@ -295,7 +302,7 @@ impl std::str::FromStr for CrsArg {
 
 /// `11.42,48.77,370`.
 #[derive(Clone, Copy, Debug)]
-struct OriginArg([f64; 3]);
+struct OriginArg(Place);
 
 impl std::str::FromStr for OriginArg {
     type Err = String;
@@ -303,9 +310,10 @@ impl std::str::FromStr for OriginArg {
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers: Option<Vec<f64>> =
             text.split(',').map(|number| number.trim().parse().ok()).collect();
-        numbers.and_then(|numbers| numbers.try_into().ok()).map(Self).ok_or_else(|| {
-            format!("expected LON,LAT,HEIGHT, such as 11.42,48.77,370, found {text}")
-        })
+        match numbers.as_deref() {
+            Some(&[lon, lat, height]) => Ok(Self(Place { lon, lat, height })),
+            _ => Err(format!("expected LON,LAT,HEIGHT, such as 11.42,48.77,370, found {text}")),
+        }
     }
 }
 

@@ -106,7 +106,7 @@ impl BuildOptions {
     }
 }
 
-/// The parameter that says where the city stands; the nodes do not depend on it.
+/// The parameter that says where the city stands; the nodes depend on it where it was in degrees.
 const PLACEMENT: &str = "placement";
 
 /// Where a scene's parameters say that it stands.
@@ -122,7 +122,8 @@ pub fn placement_of(parameters: &serde_json::Value) -> Result<Placement> {
 pub fn same_nodes(one: &serde_json::Value, other: &serde_json::Value) -> bool {
     let without = |parameters: &serde_json::Value| {
         let mut parameters = parameters.clone();
-        if let Some(parameters) = parameters.as_object_mut() {
+        let degrees = placement_of(&parameters).is_ok_and(|placement| placement.is_degrees());
+        if let Some(parameters) = parameters.as_object_mut().filter(|_| !degrees) {
             parameters.shift_remove(PLACEMENT);
         }
         parameters

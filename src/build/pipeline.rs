@@ -95,7 +95,7 @@ pub fn build(
             stages.add(Stage::Import, spent.total());
             model
         };
-        let model = match ahead.take() {
+        let mut model = match ahead.take() {
             Some(model) => model,
             None => load(input),
         }?;
@@ -114,8 +114,11 @@ pub fn build(
         let (up, up_from) = match (options.up, model.up) {
             (Some(up), _) => (up, UpFrom::Option),
             (None, Some(up)) => (up, UpFrom::Format),
+            // Degrees beside metres have no shape.
+            (None, None) if options.placement.is_degrees() => (UpAxis::Z, UpFrom::Format),
             (None, None) => (super::up::guess(&model), UpFrom::Shape),
         };
+        options.placement.localise(&mut model, up)?;
         check_place(&model, up, globe.as_ref())?;
         if let Some(quantization) = options.quantization() {
             quantization.check(&model)?;

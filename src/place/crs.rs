@@ -24,6 +24,29 @@ impl Crs {
     /// A system of metres (or feet) by its EPSG code; `height_offset` metres are added to the
     /// source's heights to make them heights over the ellipsoid.
     pub fn new(code: u32, height_offset: f64) -> Result<Self> {
+        let crs = Self::of_any_unit(code, height_offset)?;
+        if crs.source.is_latlong() {
+            return Err(crs.unsupported(
+                "its coordinates are degrees; add --origin LON,LAT,HEIGHT, a place near the model, \
+                 and it is built in metres east, north and up of there",
+            ));
+        }
+        Ok(crs)
+    }
+
+    /// A system of degrees, longitude first, by its EPSG code.
+    pub fn geographic(code: u32, height_offset: f64) -> Result<Self> {
+        let crs = Self::of_any_unit(code, height_offset)?;
+        if !crs.source.is_latlong() {
+            return Err(crs.unsupported(
+                "its coordinates are metres or feet and say where they are; expected no --origin \
+                 beside it, which is for degrees",
+            ));
+        }
+        Ok(crs)
+    }
+
+    fn of_any_unit(code: u32, height_offset: f64) -> Result<Self> {
         let unknown = || {
             Error::Usage(format!(
                 "--crs EPSG:{code}: not a known coordinate reference system; expected the code of \
@@ -32,25 +55,22 @@ impl Crs {
         };
         let small = u16::try_from(code).map_err(|_| unknown())?;
         let definition = crs_definitions::from_code(small).ok_or_else(unknown)?.proj4;
-        let unsupported =
-            |what: &str| Error::Usage(format!("--crs EPSG:{code} ({}): {what}", definition.trim()));
         let source = Proj::from_proj_string(definition)
-            .map_err(|error| unsupported(&format!("not supported: {error}")))?;
-        if source.is_latlong() {
-            return Err(unsupported(
-                "its coordinates are degrees, in which neither distances nor errors can be \
-                 measured; project the model first, or give metres and --origin LON,LAT,HEIGHT",
-            ));
-        }
-        if definition.contains("+nadgrids=") && !definition.contains("+nadgrids=@null") {
-            return Err(unsupported("it needs a grid of corrections, which is not at hand"));
-        }
-        if !source.is_normalized_axis() {
-            return Err(unsupported("its axes are not east, north and up"));
-        }
+            .map_err(|error| unsupported(small, definition, &format!("not supported: {error}")))?;
         let wgs84 = Proj::from_proj_string(GEODETIC)
             .map_err(|error| Error::Internal(format!("WGS 84: {error}")))?;
-        Ok(Self { code: small, definition, source, wgs84, height_offset })
+        let crs = Self { code: small, definition, source, wgs84, height_offset };
+        if definition.contains("+nadgrids=") && !definition.contains("+nadgrids=@null") {
+            return Err(crs.unsupported("it needs a grid of corrections, which is not at hand"));
+        }
+        if !crs.source.is_normalized_axis() {
+            return Err(crs.unsupported("its axes are not east, north and up"));
+        }
+        Ok(crs)
+    }
+
+    fn unsupported(&self, what: &str) -> Error {
+        unsupported(self.code, self.definition, what)
     }
 
     /// What limits the accuracy of positions beside the projection itself; `None` where nothing
@@ -72,7 +92,8 @@ impl Crs {
         }
     }
 
-    /// The Earth-centred WGS84 coordinates of a point: metres east, north and up in this system.
+    /// The Earth-centred WGS84 coordinates of a point: metres east, north and up in this system, or
+    /// degrees east and north and metres up.
     /// `None` where the system has no such point.
     pub fn to_ecef(&self, point: DVec3) -> Option<DVec3> {
         if self.source.is_geocent() {
@@ -83,7 +104,9 @@ impl Crs {
     }
 
     fn to_geodetic(&self, point: DVec3) -> Option<[f64; 3]> {
-        let mut moved = (point.x, point.y, point.z + self.height_offset);
+        let [x, y] =
+            [point.x, point.y].map(|c| if self.source.is_latlong() { c.to_radians() } else { c });
+        let mut moved = (x, y, point.z + self.height_offset);
         proj4rs::transform::transform(&self.source, &self.wgs84, &mut moved).ok()?;
         let (lon, lat, height) = moved;
         let sound = lon.abs() <= std::f64::consts::PI
@@ -141,6 +164,10 @@ impl Crs {
     pub fn definition(&self) -> &'static str {
         self.definition
     }
+}
+
+fn unsupported(code: u16, definition: &str, what: &str) -> Error {
+    Error::Usage(format!("--crs EPSG:{code} ({}): {what}", definition.trim()))
 }
 
 /// A point that comes back farther than this from where it was is outside of the projection.

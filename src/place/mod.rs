@@ -4,9 +4,11 @@
 //! |---|---|
 //! | `ellipsoid` | geodetic and Earth-centred coordinates, axes of a place |
 //! | `crs` | coordinate reference systems by EPSG code |
+//! | `degrees` | models in degrees, brought to metres |
 //! | `fit` | the affine map nearest to a curved one over a box |
 
 mod crs;
+mod degrees;
 mod ellipsoid;
 mod fit;
 #[cfg(test)]
@@ -16,11 +18,40 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 pub use crs::Crs;
+pub use degrees::Degrees;
 pub use ellipsoid::{east_north_up, to_ecef, wgs84_to_ecef};
 pub use fit::Fit;
 
-use crate::mesh::UpAxis;
+use crate::mesh::{Model, UpAxis};
 use crate::{Error, Result};
+
+/// A place on the WGS84 ellipsoid.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// Longitude, degrees, −180 to 180.
+    pub lon: f64,
+    /// Latitude, degrees, −90 to 90.
+    pub lat: f64,
+    /// Height over the ellipsoid, metres.
+    pub height: f64,
+}
+
+impl Place {
+    /// The axes there, to the east, the north and up.
+    fn axes(&self) -> Result<Fit> {
+        let &Self { lon, lat, height } = self;
+        let ok = (-180.0..=180.0).contains(&lon)
+            && (-90.0..=90.0).contains(&lat)
+            && (-12_000.0..=100_000.0).contains(&height);
+        if !ok {
+            return Err(Error::Usage(format!(
+                "--origin {lon},{lat},{height}: expected a longitude of -180 to 180 and a latitude \
+                 of -90 to 90 degrees, and a height of -12000 to 100000 m over the ellipsoid"
+            )));
+        }
+        Ok(Fit::from_affine(east_north_up(lon.to_radians(), lat.to_radians(), height)))
+    }
+}
 
 /// What is known of a city's place, as it was asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -30,20 +61,23 @@ pub enum Placement {
     #[default]
     Local,
     /// Coordinates are metres east, north and up of a place.
-    Origin {
-        /// Longitude, degrees, −180 to 180.
-        lon: f64,
-        /// Latitude, degrees, −90 to 90.
-        lat: f64,
-        /// Height over the WGS84 ellipsoid, metres.
-        height: f64,
-    },
+    Origin(Place),
     /// Coordinates are those of a coordinate reference system.
     Crs {
         /// Its EPSG code.
         epsg: u32,
         /// Added to heights to make them heights over the ellipsoid, metres.
         height_offset: f64,
+    },
+    /// Coordinates are longitude and latitude in degrees and height in metres; the hierarchy is
+    /// built in metres east, north and up of a place.
+    Degrees {
+        /// The EPSG code of the geographic coordinate reference system.
+        epsg: u32,
+        /// Added to heights to make them heights over the ellipsoid, metres.
+        height_offset: f64,
+        /// The place.
+        origin: Place,
     },
 }
 
@@ -52,30 +86,40 @@ impl Placement {
     pub fn globe(&self) -> Result<Option<Globe>> {
         match *self {
             Self::Local => Ok(None),
-            Self::Origin { lon, lat, height } => {
-                let ok = (-180.0..=180.0).contains(&lon)
-                    && (-90.0..=90.0).contains(&lat)
-                    && (-12_000.0..=100_000.0).contains(&height);
-                if !ok {
-                    return Err(Error::Usage(format!(
-                        "--origin {lon},{lat},{height}: expected a longitude of -180 to 180 and a \
-                         latitude of -90 to 90 degrees, and a height of -12000 to 100000 m over \
-                         the ellipsoid"
-                    )));
-                }
-                let axes = east_north_up(lon.to_radians(), lat.to_radians(), height);
-                Ok(Some(Globe::Tangent(Fit::from_affine(axes))))
-            }
+            Self::Origin(place) => Ok(Some(Globe::Tangent(place.axes()?))),
             Self::Crs { epsg, height_offset } => {
-                if !(-1e5..=1e5).contains(&height_offset) {
-                    return Err(Error::Usage(format!(
-                        "--height-offset {height_offset}: expected metres, at most 100000"
-                    )));
-                }
+                check_offset(height_offset)?;
                 Ok(Some(Globe::Crs(Box::new(Crs::new(epsg, height_offset)?))))
+            }
+            Self::Degrees { epsg, height_offset, origin } => {
+                check_offset(height_offset)?;
+                Degrees::new(epsg, height_offset, origin)?;
+                Ok(Some(Globe::Tangent(origin.axes()?)))
             }
         }
     }
+
+    /// Brings a model that is in degrees to metres, as it is built; others stay as they are.
+    pub fn localise(&self, model: &mut Model, up: UpAxis) -> Result<()> {
+        match *self {
+            Self::Local | Self::Origin(_) | Self::Crs { .. } => Ok(()),
+            Self::Degrees { epsg, height_offset, origin } => {
+                Degrees::new(epsg, height_offset, origin)?.localise(model, up)
+            }
+        }
+    }
+
+    /// Whether coordinates are degrees: the nodes depend on the place then.
+    pub fn is_degrees(&self) -> bool {
+        matches!(self, Self::Degrees { .. })
+    }
+}
+
+fn check_offset(height_offset: f64) -> Result<()> {
+    if (-1e5..=1e5).contains(&height_offset) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!("--height-offset {height_offset}: expected metres, at most 100000")))
 }
 
 /// The map from a city's coordinates, Z up, to Earth-centred ones.

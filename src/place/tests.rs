@@ -116,7 +116,10 @@ fn origins_off_the_globe_are_refused() {
         [f64::NAN, 0.0, 0.0],
         [0.0, 0.0, f64::INFINITY],
     ] {
-        assert!(Placement::Origin { lon, lat, height }.globe().is_err(), "{lon} {lat} {height}");
+        assert!(
+            Placement::Origin(Place { lon, lat, height }).globe().is_err(),
+            "{lon} {lat} {height}"
+        );
     }
 }
 
@@ -135,7 +138,7 @@ fn coordinates_of_another_system_are_refused() {
     assert!(misfit(25832, [678_016.0, 5_403_456.0, 2e6]).unwrap().contains("ellipsoid"));
     assert!(misfit(4978, [678_016.0, 5_403_456.0, 400.0]).unwrap().contains("centre"));
     assert!(misfit(25832, [1e12, 5e6, 0.0]).is_some());
-    let origin = Placement::Origin { lon: 11.4, lat: 48.7, height: 370.0 };
+    let origin = Placement::Origin(Place { lon: 11.4, lat: 48.7, height: 370.0 });
     let tangent = origin.globe().unwrap().unwrap();
     assert!(tangent.misfit(DVec3::splat(678_016.0), DVec3::splat(678_100.0)).is_some());
     assert_eq!(tangent.misfit(DVec3::splat(-500.0), DVec3::splat(500.0)), None);

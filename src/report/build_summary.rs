@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::build_report::{BuildReport, Quantized, UpFrom};
 use crate::build::options::placement_of;
-use crate::place::Placement;
+use crate::place::{Place, Placement};
 
 /// Warnings that are shown; the rest is in `build.json`.
 const SHOWN_WARNINGS: usize = 8;
@@ -100,12 +100,17 @@ fn orientation(report: &BuildReport) -> String {
             };
             format!("; coordinates of EPSG:{epsg}, {heights}")
         }
-        Ok(Placement::Origin { lon, lat, height }) => {
-            format!("; metres from {lon}° east, {lat}° north, {height} m over the ellipsoid")
+        Ok(Placement::Origin(origin)) => metres_from(origin),
+        Ok(Placement::Degrees { epsg, origin, .. }) => {
+            format!("; degrees of EPSG:{epsg}, built in{}", &metres_from(origin)[1..])
         }
         _ => "; no place on the Earth (--crs, --origin)".into(),
     };
     format!("{:?} is up{from}{place}", input.up)
+}
+
+fn metres_from(Place { lon, lat, height }: Place) -> String {
+    format!("; metres from {lon}° east, {lat}° north, {height} m over the ellipsoid")
 }
 
 /// After finding that nothing had changed.

@@ -6,7 +6,7 @@ use super::files::files_of;
 use super::*;
 use crate::format::Scene;
 use crate::format::test_scene::scene;
-use crate::place::Placement;
+use crate::place::{Place, Placement};
 
 const UTM: Placement = Placement::Crs { epsg: 25832, height_offset: 0.0 };
 
@@ -72,7 +72,7 @@ fn quarters(side: f64, depth: u32) -> Scene {
 
 #[test]
 fn every_tileset_keeps_the_rules_in_one_file_and_in_many() {
-    let origin = Placement::Origin { lon: 11.4, lat: 48.7, height: 370.0 };
+    let origin = Placement::Origin(Place { lon: 11.4, lat: 48.7, height: 370.0 });
     for scene in [scene(), quarters(700.0, 4)] {
         for placement in [Placement::Local, origin, UTM] {
             for most in [1, 2, 5, 50, 5000] {

@@ -66,6 +66,7 @@ use node_look::NodePictures;
 use points::Points;
 use source::Source;
 
+use crate::build::options::placement_of;
 use crate::build::quantize::Quantization;
 use crate::format::{SCENE_FILE, Scene};
 use crate::{Error, Result};
@@ -124,7 +125,8 @@ impl Verification<'_> {
         let source = match sources {
             [] => None,
             sources => {
-                let mut source = Source::load(sources, progress)?;
+                let placement = placement_of(&scene.parameters)?;
+                let mut source = Source::load(sources, &placement, scene.up, progress)?;
                 if let Some(lattice) = Quantization::of(&scene.parameters) {
                     source.round(lattice);
                 }

@@ -11,7 +11,8 @@ use super::seams::open_edges;
 use crate::build::quantize::Quantization;
 use crate::import::{find_inputs, load};
 use crate::mesh::Surface;
-use crate::mesh::{Model, TextureSource};
+use crate::mesh::{Model, TextureSource, UpAxis};
+use crate::place::Placement;
 use crate::{Error, Result};
 
 /// Model files, read and joined.
@@ -35,14 +36,21 @@ struct PartPlace {
 }
 
 impl Source {
-    /// Reads models and folders of them, as the build does.
-    pub fn load(arguments: &[PathBuf], progress: &dyn Progress) -> Result<Self> {
+    /// Reads models and folders of them, as the build does of a city that stands there and with
+    /// that axis up.
+    pub fn load(
+        arguments: &[PathBuf],
+        placement: &Placement,
+        up: UpAxis,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let inputs = find_inputs(arguments)?;
         progress.phase("reading the source", inputs.len() as u64 + 1);
         let (mut positions, mut triangles): (Vec<DVec3>, Vec<[u32; 3]>) = Default::default();
         let (mut models, mut parts, mut first_picture) = (Vec::new(), Vec::new(), vec![0]);
         for input in &inputs {
             let mut model = load(input)?;
+            placement.localise(&mut model, up)?;
             for (number, part) in (0..).zip(&mut model.parts) {
                 let first_vertex = positions.len() as u32;
                 parts.push(PartPlace {

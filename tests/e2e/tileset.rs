@@ -119,15 +119,16 @@ use predicates::prelude::PredicateBooleanExt;
 fn what_can_be_no_place_is_refused_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     city::write(&small_city(), &folder.path().join("city.obj")).unwrap();
-    let cases: [(&[&str], i32, &str); 9] = [
+    let cases: [(&[&str], i32, &str); 10] = [
         (&["--crs", "EPSG:99999"], 2, "EPSG:99999"),
         (&["--crs", "25832"], 2, "EPSG:CODE"),
-        (&["--crs", "EPSG:4326"], 2, "degrees"),
+        (&["--crs", "EPSG:4326"], 2, "add --origin"),
         (&["--crs", "EPSG:25832"], 3, "local metres"),
         (&["--origin", "11.4,95,0"], 2, "latitude"),
         (&["--origin", "11.4,48.7"], 2, "LON,LAT,HEIGHT"),
         (&["--origin", "11.4,nan,0"], 2, "latitude"),
-        (&["--origin", "1,2,3", "--crs", "EPSG:25832"], 2, "cannot be used with"),
+        (&["--origin", "1,2,3", "--crs", "EPSG:25832"], 2, "no --origin beside it"),
+        (&["--origin", "1,2,3", "--crs", "EPSG:4326"], 3, "km from --origin"),
         (&["--height-offset", "46"], 2, "--crs"),
     ];
     for (options, code, word) in cases {
@@ -159,4 +160,53 @@ fn metres_of_an_origin_stand_there() {
     for (axis, coordinate) in there.to_array().into_iter().enumerate() {
         assert!((root["transform"][12 + axis].as_f64().unwrap() - coordinate).abs() < 1e-6);
     }
+}
+
+#[test]
+fn a_city_in_degrees_is_built_in_metres() {
+    let folder = tempfile::tempdir().unwrap();
+    city::write(&small_city(), &folder.path().join("metres.obj")).unwrap();
+    // About so many metres to a degree there; the city is stretched by as much as that is wrong.
+    let text = fs::read_to_string(folder.path().join("metres.obj")).unwrap();
+    let degrees: Vec<String> = text
+        .lines()
+        .map(|line| match line.strip_prefix("v ") {
+            None => line.to_owned(),
+            Some(rest) => {
+                let numbers: Vec<f64> =
+                    rest.split_whitespace().map(|number| number.parse().unwrap()).collect();
+                let (lon, lat) = (11.42 + numbers[0] / 73_500.0, 48.76 + numbers[1] / 111_200.0);
+                format!("v {lon:.12} {lat:.12} {}", 370.0 + numbers[2])
+            }
+        })
+        .collect();
+    fs::write(folder.path().join("degrees.obj"), degrees.join("\n")).unwrap();
+    let place = ["--crs", "EPSG:4326", "--origin", "11.42,48.76,370"];
+    let built = |place: &[&str]| {
+        run_build(folder.path(), &[&SMALL_NODES[..], place, &["degrees.obj", "out"]].concat())
+    };
+    let text = built(&place);
+    assert!(text.contains("degrees of EPSG:4326, built in metres"), "{text}");
+    run_build(folder.path(), &[&SMALL_NODES[..], &["metres.obj", "plain"]].concat());
+    let [scene, plain] = ["out", "plain"].map(|out| Scene::read(&folder.path().join(out)).unwrap());
+    let size = |scene: &Scene| -> [f64; 3] {
+        let fold = |of: fn(f64, f64) -> f64, ends: fn(&hlod::format::Node) -> [f64; 3]| {
+            let first = ends(&scene.nodes[0]);
+            scene.nodes.iter().map(ends).fold(first, |a, b| std::array::from_fn(|i| of(a[i], b[i])))
+        };
+        let (low, high) = (fold(f64::min, |n| n.bbox_min), fold(f64::max, |n| n.bbox_max));
+        std::array::from_fn(|i| high[i] - low[i])
+    };
+    for (found, expected) in size(&scene).into_iter().zip(size(&plain)) {
+        assert!((found / expected - 1.0).abs() < 0.005, "{found} m, {expected} m");
+    }
+    let verify = ["verify", "out", "--source", "degrees.obj", "--samples", "1000"];
+    run_build(folder.path(), &verify);
+    assert!(built(&place).contains("up to date"));
+    // From another origin everything lies elsewhere.
+    let out = folder.path().join("out");
+    let before = contents(&out);
+    built(&["--crs", "EPSG:4326", "--origin", "11.421,48.76,370"]);
+    assert!(difference(&before, &contents(&out)).is_some());
+    run_build(folder.path(), &verify);
 }
