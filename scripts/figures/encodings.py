@@ -38,15 +38,7 @@ def main():
     )
     print(text)
     if arguments.write:
-        write_between_markers(ROOT / "README.md", "encodings", sizes(rows))
-
-
-def sizes(rows):
-    """The sizes of real data alone: a row for each input, a column for each encoding."""
-    names = [name for name in dict.fromkeys(row[0] for row in rows) if name.startswith("`")]
-    by_place = {(name, encoding): nodes for name, encoding, nodes, *_ in rows}
-    lines = [[name, *(by_place[name, encoding] for encoding, _ in ENCODINGS)] for name in names]
-    return table(["", *(f"{encoding}, MB" for encoding, _ in ENCODINGS)], lines)
+        write_between_markers(ROOT / "README.md", "encodings", text)
 
 
 def measure(programs, name, models, runs):
