@@ -13,14 +13,13 @@ const WIDTHS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
 /** The numbers of an accessor, element after element; normalized ones within 0 to 1. */
 function elements(glb, index) {
-    const { json, bin } = glb;
+    const { json, views } = glb;
     const { bufferView, byteOffset = 0, componentType, normalized, count, type } = json.accessors[index];
     const view = json.bufferViews[bufferView];
     const [Kind, most] = COMPONENTS[componentType];
     const width = WIDTHS[type];
     const stride = (view.byteStride ?? width * Kind.BYTES_PER_ELEMENT) / Kind.BYTES_PER_ELEMENT;
-    const begin = (view.byteOffset ?? 0) + byteOffset;
-    const raw = new Kind(bin.slice(begin, begin + count * stride * Kind.BYTES_PER_ELEMENT));
+    const raw = new Kind(views[bufferView].slice(byteOffset, byteOffset + count * stride * Kind.BYTES_PER_ELEMENT));
     const out = new Float64Array(count * width);
     for (let i = 0; i < count; i++) {
         for (let c = 0; c < width; c++) {
@@ -30,20 +29,33 @@ function elements(glb, index) {
     return out;
 }
 
-/** JSON and binary chunk of a GLB. */
-function parse(bytes) {
+/** JSON and buffer views of a GLB, decompressed. */
+async function parse(bytes) {
     const words = new DataView(bytes);
     const length = words.getUint32(12, true);
     const json = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 20, length)));
-    return { json, bin: bytes.slice(20 + length + 8) };
+    const bin = bytes.slice(20 + length + 8);
+    const part = ({ byteOffset = 0, byteLength }) => bin.slice(byteOffset, byteOffset + byteLength);
+    const view = async (view) => {
+        const packed = view.extensions?.EXT_meshopt_compression;
+        if (!packed) {
+            return part(view);
+        }
+        const { MeshoptDecoder } = await import('/meshoptimizer/index.js');
+        await MeshoptDecoder.ready;
+        const { count, byteStride, mode, filter } = packed;
+        const unpacked = new Uint8Array(count * byteStride);
+        MeshoptDecoder.decodeGltfBuffer(unpacked, count, byteStride, new Uint8Array(part(packed)), mode, filter);
+        return unpacked.buffer;
+    };
+    return { json, views: await Promise.all((json.bufferViews ?? []).map(view)) };
 }
 
 async function pixels(glb, image, base) {
     const { bufferView, mimeType, uri } = image;
     let blob;
     if (uri === undefined) {
-        const { byteOffset = 0, byteLength } = glb.json.bufferViews[bufferView];
-        blob = new Blob([glb.bin.slice(byteOffset, byteOffset + byteLength)], { type: mimeType });
+        blob = new Blob([glb.views[bufferView]], { type: mimeType });
     } else {
         blob = await (await fetch(new URL(uri, base))).blob();
     }
@@ -62,12 +74,11 @@ const toSrgb = (linear) =>
  * it that has a picture: sums, to be divided by `area`.
  */
 async function surfaceColours(url) {
-    const glb = parse(await (await fetch(url)).arrayBuffer());
+    const glb = await parse(await (await fetch(url)).arrayBuffer());
     const { json } = glb;
     const sum = { area: 0, textured: 0, rgb: [0, 0, 0] };
-    if (json.extensionsRequired?.some((name) => /meshopt|quantization/.test(name))) {
-        return sum;
-    }
+    // Quantised positions are in steps, and those of files too large for them are not.
+    const scale = Math.hypot(...(json.nodes?.[0]?.matrix?.slice(0, 3) ?? [1]));
     const pictures = await Promise.all((json.images ?? []).map((image) => pixels(glb, image, url)));
     for (const { attributes, indices, material } of json.meshes?.[0]?.primitives ?? []) {
         const positions = elements(glb, attributes.POSITION);
@@ -82,7 +93,7 @@ async function surfaceColours(url) {
             const [a, b, c] = [point(0), point(1), point(2)];
             const side = (to, axis) => to[axis] - a[axis];
             const cross = (i, j) => side(b, i) * side(c, j) - side(b, j) * side(c, i);
-            const area = Math.hypot(cross(1, 2), cross(2, 0), cross(0, 1)) / 2;
+            const area = (scale * scale * Math.hypot(cross(1, 2), cross(2, 0), cross(0, 1))) / 2;
             const mean = (values, width, channel) =>
                 [0, 1, 2].reduce((s, k) => s + values[width * corners[t + k] + channel], 0) / 3;
             let rgb = factor.slice(0, 3);

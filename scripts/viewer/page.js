@@ -120,7 +120,7 @@ window.hlod = {
             triangles: [...shown.values()].reduce((sum, content) => sum + content.trianglesLength, 0),
             bytes: tileset.totalMemoryUsageInBytes,
             coarsest: Math.max(...errors),
-            finest: Math.min(...errors),
+            error: errors.reduce((sum, error) => sum + error, 0) / errors.length,
             milliseconds: performance.now() - begin,
         };
     },

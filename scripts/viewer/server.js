@@ -11,6 +11,7 @@ const TYPES = {
     '.jpg': 'image/jpeg',
     '.js': 'text/javascript',
     '.json': 'application/json',
+    '.mjs': 'text/javascript',
     '.png': 'image/png',
     '.svg': 'image/svg+xml',
     '.wasm': 'application/wasm',
@@ -36,6 +37,8 @@ function serve(folders, port = 0) {
     const roots = new Map([
         ['page', __dirname],
         ['cesium', cesiumRoot()],
+        // CesiumJS depends on it.
+        ['meshoptimizer', path.dirname(require.resolve('meshoptimizer'))],
     ]);
     folders.forEach((folder, number) => roots.set(`out/${number}`, path.resolve(folder)));
     const answer = (request, response) => {
