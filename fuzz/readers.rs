@@ -4,6 +4,9 @@
 //! Used by the fuzz targets beside it, and by `tests/fuzz`, which runs it over seeded changes of
 //! sound files.
 
+// Each target uses one of them alone.
+#![allow(dead_code)]
+
 use std::path::Path;
 
 use hlod::bench::ClockConstants;
