@@ -175,7 +175,13 @@ impl Search<'_> {
     /// The part between corners where points of it may be too far, and its centre measured.
     fn open<const N: usize>(&mut self, corners: [Corner; N]) -> Option<Part<N>> {
         let places = corners.map(|corner| corner.at);
-        if corners.iter().any(|corner| self.covers(self.squared_from(corner.near, places))) {
+        let reached_from = |number: usize| {
+            // The corner itself is no farther from its triangle than the largest distance.
+            let triangle = &self.grid.triangles[corners[number].near as usize];
+            let others = (0..N).filter(|&other| other != number);
+            others.into_iter().all(|other| self.covers(triangle.squared_distance(places[other])))
+        };
+        if (0..N).any(reached_from) {
             return None;
         }
         let centre = self.measure(centre(places));
