@@ -9,7 +9,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::border::Border;
 use super::compact::compact;
-use crate::mesh::{Mesh, PositionKey, key, wide};
+use crate::mesh::{Mesh, PositionKey, all_differ, key, wide};
 
 /// Halvings of the cell size's range; the count of triangles is nearly monotone in it.
 const SEARCH_STEPS: usize = 14;
@@ -164,9 +164,9 @@ fn turned([a, b, c]: [u32; 3]) -> [u32; 3] {
 fn count(mesh: &Mesh, cells: &[u32]) -> usize {
     let mut seen: FxHashSet<[u32; 3]> = FxHashSet::default();
     for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|vertex| cells[vertex as usize]);
-        if a != b && b != c && c != a {
-            seen.insert(turned([a, b, c]));
+        let corners = triangle.map(|vertex| cells[vertex as usize]);
+        if all_differ(corners) {
+            seen.insert(turned(corners));
         }
     }
     seen.len()
@@ -215,8 +215,8 @@ fn collapse_cells(
     }
     let mut seen: FxHashSet<[u32; 3]> = FxHashSet::default();
     result.triangles.retain_mut(|triangle| {
-        let [a, b, c] = triangle.map(|vertex| cells[vertex as usize]);
-        if a == b || b == c || c == a || !seen.insert(turned([a, b, c])) {
+        let corners = triangle.map(|vertex| cells[vertex as usize]);
+        if !all_differ(corners) || !seen.insert(turned(corners)) {
             return false;
         }
         *triangle = triangle

@@ -19,7 +19,7 @@ use super::border::{Border, Path};
 use super::chain::{BorderVertex, CutPlane, KeepRule};
 use super::compact::renumber;
 use super::lattice::Lattice;
-use crate::mesh::{Coordinate, Mesh, PositionKey, key};
+use crate::mesh::{Coordinate, Mesh, PositionKey, all_differ, key};
 
 /// Limits of the labelling.
 #[derive(Clone, Copy, Debug)]
@@ -108,11 +108,11 @@ fn without_collapsed<C: Coordinate>(
     labels: &[i8],
     triangles: &[[u32; 3]],
 ) -> Option<Vec<[u32; 3]>> {
-    let collapsed = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
-        a == b || b == c || c == a
-    };
-    triangles.iter().find(|triangle| collapsed(triangle))?;
+    let collapsed =
+        |triangle: &[u32; 3]| !all_differ(triangle.map(|vertex| mesh.positions[vertex as usize]));
+    if !triangles.iter().any(collapsed) {
+        return None;
+    }
     let mut used = vec![false; mesh.positions.len()];
     for triangle in triangles.iter().filter(|triangle| !collapsed(triangle)) {
         triangle.iter().for_each(|&vertex| used[vertex as usize] = true);

@@ -11,7 +11,7 @@ use super::cut::{Cut, CutTolerance, Piece, cut};
 use super::lattice::Lattice;
 use super::quantize::Quantization;
 use super::stages::{Stage, Stages};
-use crate::mesh::{Material, Mesh, Part, PositionKey, color_key, key, texcoord_key};
+use crate::mesh::{Material, Mesh, Part, PositionKey, all_differ, color_key, key, texcoord_key};
 
 /// What makes two source vertices one.
 type VertexKey = (PositionKey<f64>, u64, u64, u32);
@@ -196,10 +196,7 @@ pub fn localise(
     };
     let before = mesh.triangles.len();
     let positions = &mesh.positions;
-    mesh.triangles.retain(|&[a, b, c]| {
-        let [a, b, c] = [a, b, c].map(|vertex| positions[vertex as usize]);
-        a != b && b != c && c != a
-    });
+    mesh.triangles.retain(|corners| all_differ(corners.map(|vertex| positions[vertex as usize])));
     let dropped = (before - mesh.triangles.len()) as u64;
     let mut path = Path::default();
     for bit in 0..wide_path.len() as u32 {

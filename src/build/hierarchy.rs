@@ -24,7 +24,7 @@ use super::skirt::{Skirt, skirts, triangles_of};
 use super::stages::{Stage, Stages};
 use super::thin_border::thin_border;
 use crate::Result;
-use crate::mesh::{Mesh, UpAxis};
+use crate::mesh::{Mesh, UpAxis, all_differ};
 use crate::texture::{BakePlan, BakeReason, Seams};
 
 /// What a coarse node is simplified from.
@@ -452,10 +452,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let Simplified { mut mesh, border, error, step } = simplified;
         mesh.positions.iter_mut().for_each(|position| *position = self.lattice.nearest(*position));
         let Mesh { positions, triangles, .. } = &mut mesh;
-        triangles.retain(|corners| {
-            let [a, b, c] = corners.map(|vertex| positions[vertex as usize]);
-            a != b && b != c && c != a
-        });
+        triangles.retain(|corners| all_differ(corners.map(|vertex| positions[vertex as usize])));
         let (mesh, border) = compact(&mesh, &border);
         Simplified { mesh, border, error, step }
     }

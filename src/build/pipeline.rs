@@ -115,7 +115,7 @@ pub fn build(
             (Some(up), _) => (up, UpFrom::Option),
             (None, Some(up)) => (up, UpFrom::Format),
             // Degrees beside metres have no shape.
-            (None, None) if options.placement.is_degrees() => (UpAxis::Z, UpFrom::Format),
+            (None, None) if options.placement.is_degrees() => (UpAxis::Z, UpFrom::Degrees),
             (None, None) => (super::up::guess(&model), UpFrom::Shape),
         };
         options.placement.localise(&mut model, up)?;
@@ -188,8 +188,8 @@ pub fn build(
     let up = agreed_up(&reports, &mut warnings);
     let scene = scene_of(blocks, shared_textures, parameters.clone(), up, &reports)?;
 
-    if let Some(quantization) = options.quantization() {
-        quantization.check_extent(bounds(&scene))?;
+    if let (Some(quantization), Some(bounds)) = (options.quantization(), scene.bounds()) {
+        quantization.check_extent(bounds)?;
     }
     // As whoever reads the scene will see it.
     let placement = placement_of(&scene.parameters)?;
@@ -228,17 +228,6 @@ pub fn build(
     output.write(REPORT_FILE, report.to_json()?.as_bytes())?;
     output.commit()?;
     Ok(Outcome::Built(report))
-}
-
-/// Least and greatest coordinates of a scene.
-fn bounds(scene: &Scene) -> [[f64; 3]; 2] {
-    let empty = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    scene.nodes.iter().fold(empty, |[low, high], node| {
-        [
-            std::array::from_fn(|axis| low[axis].min(node.bbox_min[axis])),
-            std::array::from_fn(|axis| high[axis].max(node.bbox_max[axis])),
-        ]
-    })
 }
 
 fn quantized(scene: &Scene, quantization: Quantization) -> Quantized {

@@ -5,7 +5,8 @@
 //! anything is cut, cut vertices when they are made, and what simplification moved before its error
 //! is measured. So what is stored is what was measured, and neighbours stay equal in every bit.
 
-use crate::mesh::{Model, Part};
+use super::lattice::Lattice;
+use crate::mesh::{Model, Part, all_differ};
 use crate::{Error, Result};
 
 /// The parameter of a scene that holds the step, metres.
@@ -52,8 +53,8 @@ impl Quantization {
 
     /// A coordinate rounded to the lattice.
     pub fn round(&self, coordinate: f64) -> f64 {
-        // A power of two: quotient and product are exact. Adding 0 turns -0 into 0.
-        (coordinate / self.step).round() * self.step + 0.0
+        // Adding 0 turns -0 into 0.
+        Lattice { step: self.step }.round(coordinate) + 0.0
     }
 
     /// Refuses a model whose coordinates have no place on the lattice.
@@ -92,10 +93,8 @@ impl Quantization {
         for part in &mut model.parts {
             let Part { positions, indices, .. } = part;
             positions.iter_mut().flatten().for_each(|c| *c = self.round(*c));
-            let apart = |corners: &[u32; 3]| {
-                let [a, b, c] = corners.map(|vertex| positions[vertex as usize]);
-                a != b && b != c && c != a
-            };
+            let apart =
+                |corners: &[u32; 3]| all_differ(corners.map(|vertex| positions[vertex as usize]));
             let kept: Vec<[u32; 3]> =
                 indices.as_chunks::<3>().0.iter().copied().filter(apart).collect();
             if kept.len() * 3 < indices.len() {

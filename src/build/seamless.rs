@@ -7,7 +7,7 @@
 use rustc_hash::FxHashMap;
 
 use super::border::Border;
-use crate::mesh::{Mesh, PositionKey, key};
+use crate::mesh::{Mesh, PositionKey, all_differ, key};
 use crate::texture::BakeClasses;
 
 /// Joins the vertices of each class that lie at one place.
@@ -40,7 +40,7 @@ pub fn without_seams(mesh: &Mesh, border: &Border, classes: &BakeClasses) -> (Me
         new_index.push(index);
     }
     let triangles = mesh.triangles.iter().map(|t| t.map(|vertex| new_index[vertex as usize]));
-    result.triangles = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+    result.triangles = triangles.filter(|&corners| all_differ(corners)).collect();
     (result, joined_border)
 }
 

@@ -7,7 +7,7 @@
 use rustc_hash::FxHashMap;
 
 use super::border::{Border, Fate, Path};
-use crate::mesh::{Mesh, PositionKey, key, wide};
+use crate::mesh::{Mesh, PositionKey, all_differ, key, wide};
 
 /// An edge by the positions of its ends, in key order.
 pub type EdgeKey = [PositionKey<f32>; 2];
@@ -108,7 +108,7 @@ pub fn thin_border(mesh: &mut Mesh, border: &mut Border, path: &Path, level: u8)
     for corner in mesh.triangles.as_flattened_mut() {
         *corner = target[*corner as usize];
     }
-    mesh.triangles.retain(|&[a, b, c]| a != b && b != c && c != a);
+    mesh.triangles.retain(|&corners| all_differ(corners));
     stuck
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::mesh::{Part, Warnings};
+use crate::mesh::{Part, Warnings, all_differ};
 
 /// What was removed or ignored in one file, and how often.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,7 +77,7 @@ fn drop_flat(part: &mut Part, tally: &mut Tally) {
             tally.not_finite += 1;
             return false;
         }
-        if corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0] {
+        if !all_differ(corners) {
             tally.degenerate += 1;
             return false;
         }

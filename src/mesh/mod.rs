@@ -10,4 +10,5 @@ pub use coordinate::{Coordinate, Key, PositionKey, color_key, key, texcoord_key,
 pub use material::{AlphaMode, Material, TextureData, TextureSource, Wrap};
 pub use model::{Group, Model, Part, UpAxis, Warnings};
 pub use piece::Mesh;
+pub(crate) use piece::all_differ;
 pub(crate) use surface::Surface;

@@ -22,6 +22,11 @@ pub struct Mesh<C = f32> {
     pub triangles: Vec<[u32; 3]>,
 }
 
+/// Whether a triangle's three corners (vertices, places or cells) are all different.
+pub(crate) fn all_differ<T: PartialEq>([a, b, c]: [T; 3]) -> bool {
+    a != b && b != c && c != a
+}
+
 impl<C: Coordinate> Mesh<C> {
     /// The material of a triangle.
     pub fn triangle_material(&self, triangle: [u32; 3]) -> u32 {

@@ -100,6 +100,8 @@ pub enum UpFrom {
     Format,
     /// From the shape: an assumption.
     Shape,
+    /// Longitude, latitude and height, in this order: an assumption.
+    Degrees,
 }
 
 impl FileReport {

@@ -89,6 +89,7 @@ fn orientation(report: &BuildReport) -> String {
         Some(UpFrom::Option) => " (--up)",
         Some(UpFrom::Format) => " (the format says so)",
         Some(UpFrom::Shape) => " (assumed from the shape; --up says otherwise)",
+        Some(UpFrom::Degrees) => " (assumed of degrees; --up says otherwise)",
         None => "",
     };
     let place = match placement_of(&report.parameters) {

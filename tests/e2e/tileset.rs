@@ -187,6 +187,7 @@ fn a_city_in_degrees_is_built_in_metres() {
     };
     let text = built(&place);
     assert!(text.contains("degrees of EPSG:4326, built in metres"), "{text}");
+    assert!(text.contains("Z is up (assumed of degrees"), "{text}");
     run_build(folder.path(), &[&SMALL_NODES[..], &["metres.obj", "plain"]].concat());
     let [scene, plain] = ["out", "plain"].map(|out| Scene::read(&folder.path().join(out)).unwrap());
     let size = |scene: &Scene| -> [f64; 3] {
