@@ -1,10 +1,11 @@
 //! Dividing an input into blocks, the unit at the top of each tree.
 //!
 //! A block should have a few tens of thousands of triangles and be compact. Groups of the source
-//! are blocks where they are of that size; tiny ones are merged with their neighbours, and where
-//! there are no groups, or one is huge, the mesh is cut, exactly as nodes are (see
-//! [`super::cut`]).
+//! are blocks where they are of that size; tiny ones are merged with their neighbours, and so are
+//! those of one surface ([`super::welds`]); where there are no groups, or one is huge, the mesh is
+//! cut, exactly as nodes are (see [`super::cut`]).
 
+use super::welds::join_welded;
 use crate::mesh::{Model, UpAxis};
 
 /// How blocks are made.
@@ -57,6 +58,10 @@ const HUGE_BUDGETS: usize = 400;
 /// as many.
 const DIVIDED_BUDGETS: usize = 128;
 
+/// A block that shares more vertices with others than a root's budget divided by this is made one
+/// with them: all of them are there at every level.
+const WELDED: usize = 8;
+
 /// A block before its geometry is gathered.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BlockPlan {
@@ -73,7 +78,7 @@ pub struct BlockPlan {
 pub enum Division {
     /// It stays whole.
     Whole,
-    /// Halved across the longest side until no piece has more triangles than this.
+    /// Halved until no piece has more triangles than this.
     Halves {
         /// Triangles.
         most: usize,
@@ -142,7 +147,8 @@ pub fn plan(model: &Model, mode: BlockMode, desired_tris: u32, up: UpAxis) -> Ve
                     .push((first, BlockPlan { name: name(first), parts, divide: Division::Whole }));
             }
             plans.sort_by_key(|(first, _)| *first);
-            plans.into_iter().map(|(_, plan)| plan).collect()
+            let plans = plans.into_iter().map(|(_, plan)| plan).collect();
+            join_welded(model, plans, budget / WELDED, MERGED_BUDGETS * budget)
         }
     }
 }

@@ -3,7 +3,8 @@
 //!
 //! Every vertex is labelled below, above, or on the plane; only edges from below to above are
 //! split. Any labelling gives two pieces that fit together without gap or overlap, since both get
-//! the same vertices; that freedom is used twice:
+//! the same vertices; that freedom is used three times:
+//! - Small separate bodies are on one side with all their vertices ([`super::whole`]).
 //! - A vertex so near the plane that a split edge would leave a sliver counts as on it.
 //! - An edge that lies on an earlier cut is never split, since the neighbour across that cut would
 //!   not know of the new vertex (a T-junction); its end nearer to the plane counts as on it.
@@ -19,6 +20,7 @@ use super::border::{Border, Path};
 use super::chain::{BorderVertex, CutPlane, KeepRule};
 use super::compact::renumber;
 use super::lattice::Lattice;
+use super::whole::WholeBodies;
 use crate::mesh::{Coordinate, Mesh, PositionKey, all_differ, key};
 
 /// Limits of the labelling.
@@ -69,6 +71,8 @@ pub struct Cut<'a, C> {
     pub lattice: Option<Lattice>,
     /// See [`CutTolerance`].
     pub tolerance: CutTolerance,
+    /// What is not cut but goes to one side.
+    pub whole: WholeBodies,
     /// How many of the new border's vertices each level keeps.
     pub rule: &'a KeepRule,
 }
@@ -172,6 +176,9 @@ fn label<C: Coordinate>(mesh: &Mesh<C>, border: &Border, cut: &Cut<C>) -> Vec<i8
             }
         })
         .collect();
+    for (vertex, above) in cut.whole.sides(mesh, cut.axis, cut.coordinate) {
+        labels[vertex as usize] = if above { ABOVE } else { BELOW };
+    }
     let step = cut.lattice.map_or(0.0, |lattice| lattice.step);
     let nearest = cut.tolerance.sliver_steps * step;
     let mut marked: FxHashSet<PositionKey<C>> = FxHashSet::default();
@@ -469,6 +476,7 @@ mod tests {
             coordinate: 2.0,
             lattice: Some(Lattice { step: 1.0 }),
             tolerance: CutTolerance { sliver_share: 0.0, sliver_steps: 0.0 },
+            whole: WholeBodies::default(),
             rule: &rule,
         };
         let (below, above) = cut(Piece { mesh, border, moved, ..Piece::default() }, &how);

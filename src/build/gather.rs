@@ -8,9 +8,11 @@ use super::blocks::Division;
 use super::border::{Border, Path};
 use super::chain::{Chain, CutPlane, KeepRule};
 use super::cut::{Cut, CutTolerance, Piece, cut};
+use super::cut_axis::axis_to_cut;
 use super::lattice::Lattice;
 use super::quantize::Quantization;
 use super::stages::{Stage, Stages};
+use super::whole::WholeBodies;
 use crate::mesh::{Material, Mesh, Part, PositionKey, all_differ, color_key, key, texcoord_key};
 
 /// What makes two source vertices one.
@@ -79,8 +81,9 @@ pub fn divide(
                 match grid_line(&piece.mesh, metres, axes).filter(|_| piece.path.len() < 40) {
                     None => done.push(piece),
                     Some((axis, line)) => {
-                        let (below, above) = stages
-                            .time(Stage::Gather, || cut_at(piece, axis, line, &rule, lattice));
+                        let (below, above) = stages.time(Stage::Gather, || {
+                            cut_at(piece, axis, line, WholeBodies::default(), &rule, lattice)
+                        });
                         if below.mesh.triangles.is_empty() || above.mesh.triangles.is_empty() {
                             // Everything was on one side but for a vertex within tolerance.
                             done.extend(
@@ -97,7 +100,10 @@ pub fn divide(
     done
 }
 
-/// Halves a piece across its longest side until no part of it has more than `most` triangles.
+/// A separate body with more than this share of a block's triangles is cut.
+const BODIES_PER_BLOCK: usize = 32;
+
+/// Halves a piece ([`super::cut_axis`]) until no part of it has more than `most` triangles.
 fn halves(
     piece: Piece<f64>,
     most: usize,
@@ -112,14 +118,19 @@ fn halves(
     let Some((low, high)) = piece.mesh.bounds().filter(|_| triangles > most) else {
         return vec![piece];
     };
-    let side = |axis: usize| high[axis] - low[axis];
-    let axis = (1..3).fold(0, |best, axis| if side(axis) > side(best) { axis } else { best });
-    let middle = stages.time(Stage::Gather, || median_of_triangles(&piece.mesh, axis));
-    let middle = lattice.map_or(middle, |lattice| lattice.round(middle));
+    let middle = |axis: usize| {
+        let middle = median_of_triangles(&piece.mesh, axis);
+        lattice.map_or(middle, |lattice| lattice.round(middle))
+    };
+    let axis = stages.time(Stage::Gather, || axis_to_cut(&piece.mesh, |axis| vec![middle(axis)]));
+    let Some(axis) = axis else { return vec![piece] };
+    let middle = middle(axis);
     if !(middle > low[axis] && middle < high[axis]) || piece.path.len() >= 12 {
         return vec![piece];
     }
-    let (below, above) = stages.time(Stage::Gather, || cut_at(piece, axis, middle, rule, lattice));
+    let whole = WholeBodies::in_slabs((high[axis] - low[axis]) * 0.5, most / BODIES_PER_BLOCK);
+    let (below, above) =
+        stages.time(Stage::Gather, || cut_at(piece, axis, middle, whole, rule, lattice));
     let (mut done, above) = rayon::join(
         || halves(below, most, rule, lattice, stages),
         || halves(above, most, rule, lattice, stages),
@@ -132,6 +143,7 @@ fn cut_at(
     piece: Piece<f64>,
     axis: usize,
     at: f64,
+    whole: WholeBodies,
     rule: &KeepRule,
     lattice: Option<Lattice>,
 ) -> (Piece<f64>, Piece<f64>) {
@@ -139,7 +151,7 @@ fn cut_at(
     // it, and what meets when it is rounded meets here.
     let coordinate = lattice.map_or(at, |lattice| lattice.round(at));
     let tolerance = CutTolerance { sliver_steps: 1.0, ..CutTolerance::default() };
-    cut(piece, &Cut { axis, coordinate, lattice, tolerance, rule })
+    cut(piece, &Cut { axis, coordinate, lattice, tolerance, whole, rule })
 }
 
 /// The coordinate that halves the triangles by their centres.

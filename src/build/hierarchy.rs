@@ -13,8 +13,10 @@ use super::border_run::{BorderRun, join_runs, original_runs};
 use super::chain::KeepRule;
 use super::compact::compact;
 use super::cut::{Cut, CutTolerance, Piece, cut};
+use super::cut_axis::axis_to_cut;
 use super::distance::hausdorff_with;
 use super::lattice::Lattice;
+use super::lid::close_sections;
 use super::merge::merge;
 use super::quantize::Quantization;
 use super::remnant::remnant;
@@ -23,6 +25,7 @@ use super::simplify::{AppearanceWeights, LadderStep, Method, Simplified, Simplif
 use super::skirt::{Skirt, skirts, triangles_of};
 use super::stages::{Stage, Stages};
 use super::thin_border::thin_border;
+use super::whole::WholeBodies;
 use crate::Result;
 use crate::mesh::{Mesh, UpAxis, all_differ};
 use crate::texture::{BakePlan, BakeReason, Seams};
@@ -61,9 +64,10 @@ const REMNANT_TRIANGLES: usize = 8;
 
 /// A node's budget is at least this share of `desired_tris`, where its piece has so many. Pieces
 /// with few triangles are walls and roofs that stand alone, and large: dividing their number by
-/// that of a level saves next to nothing and takes whole sides off them. Measured on `ingolstadt`:
-/// 0.2 % more triangles on level 1, at less than half the mean distance.
-const LEAST_BUDGET: f64 = 1.0 / 8.0;
+/// that of a level saves next to nothing and takes whole sides off them. Measured against half of
+/// this: 0.1 to 0.4 % more triangles on level 1 of cities; 2 % on `torcs_street1`, at a fifth of the
+/// RMS distance.
+const LEAST_BUDGET: f64 = 1.0 / 4.0;
 
 /// A node keeps at most one border vertex on a plane for this many triangles of its budget: each
 /// costs about a triangle of the mesh and two of a skirt, and a node has two planes. Measured: with
@@ -297,20 +301,19 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         }
     }
 
-    /// Cuts a piece by `level_factor - 1` planes across its longest side; pieces without
-    /// triangles are left out.
+    /// Cuts a piece by `level_factor - 1` planes at even distances ([`super::cut_axis`]); pieces
+    /// without triangles are left out.
     pub fn divide(&self, piece: Piece, level: usize) -> Vec<Piece> {
         let Some((low, high)) = piece.mesh.bounds() else { return vec![piece] };
-        let side = |axis: usize| f64::from(high[axis]) - f64::from(low[axis]);
-        let axis = (1..3).fold(0, |best, axis| if side(axis) > side(best) { axis } else { best });
         let slabs = self.options.level_factor;
-        let planes: Vec<f32> = (1..slabs)
-            .map(|i| {
-                let share = f64::from(i) / f64::from(slabs);
-                let even = self.lattice.round(f64::from(low[axis]) + side(axis) * share);
-                self.through_vertices(&piece.mesh, axis, even as f32)
-            })
-            .collect();
+        let even = |axis: usize| -> Vec<f32> {
+            let (low, high) = (f64::from(low[axis]), f64::from(high[axis]));
+            let at = |i| low + (high - low) * (f64::from(i) / f64::from(slabs));
+            (1..slabs).map(|i| self.lattice.round(at(i)) as f32).collect()
+        };
+        let Some(axis) = axis_to_cut(&piece.mesh, even) else { return vec![piece] };
+        let through = |even| self.through_vertices(&piece.mesh, axis, even);
+        let planes: Vec<f32> = even(axis).into_iter().map(through).collect();
         let shares: Vec<f64> = self.factors[level + 1..]
             .iter()
             .map(|factor| match self.options.borders {
@@ -334,7 +337,9 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             collinear: if locked { -1.0 } else { self.lattice.step },
         };
         let mut pieces = Vec::with_capacity(slabs as usize);
-        self.bisect(piece, axis, &planes, &rule, &mut pieces);
+        let slab = (f64::from(high[axis]) - f64::from(low[axis])) / f64::from(slabs);
+        let whole = WholeBodies::in_slabs(slab, self.options.desired_tris as usize / 2);
+        self.bisect(piece, axis, &planes, whole, &rule, &mut pieces);
         pieces
     }
 
@@ -363,6 +368,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         piece: Piece,
         axis: usize,
         planes: &[f32],
+        whole: WholeBodies,
         rule: &KeepRule,
         pieces: &mut Vec<Piece>,
     ) {
@@ -381,11 +387,12 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
                 coordinate: planes[middle],
                 lattice: Some(self.lattice),
                 tolerance: self.options.tolerance,
+                whole,
                 rule,
             },
         );
-        self.bisect(below, axis, &planes[..middle], rule, pieces);
-        self.bisect(above, axis, &planes[middle + 1..], rule, pieces);
+        self.bisect(below, axis, &planes[..middle], whole, rule, pieces);
+        self.bisect(above, axis, &planes[middle + 1..], whole, rule, pieces);
     }
 
     /// Simplifies and writes a node that is not a leaf.
@@ -488,6 +495,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         if result.mesh.triangles.is_empty() {
             result = remnant(source, &border, REMNANT_TRIANGLES.min(target));
         }
+        close_sections(&mut result, &runs, path, &mesh, &border);
         let mut skirts = skirts(&result.mesh, &result.border, &runs, path, skirt_step);
         if self.quantization.is_some() {
             for (position, _) in skirts.iter_mut().flat_map(|skirt| &mut skirt.corners) {

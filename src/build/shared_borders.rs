@@ -23,11 +23,26 @@ pub fn shared_positions<P>(
 where
     P: Iterator<Item = [f64; 3]>,
 {
+    let mut shared: FxHashSet<PositionKey<f64>> = FxHashSet::default();
+    each_shared(blocks, positions, |position, _, _| {
+        shared.insert(position);
+    });
+    shared
+}
+
+/// Calls `found` with each position that several blocks use, the first of them, and each other one.
+pub fn each_shared<P>(
+    blocks: &[Bounds],
+    positions: impl Fn(usize) -> P,
+    mut found: impl FnMut(PositionKey<f64>, usize, usize),
+) where
+    P: Iterator<Item = [f64; 3]>,
+{
     let meet = |a: &Bounds, b: &Bounds| (0..3).all(|i| a.0[i] <= b.1[i] && b.0[i] <= a.1[i]);
     let holds =
         |bounds: &Bounds, p: &[f64; 3]| (0..3).all(|i| bounds.0[i] <= p[i] && p[i] <= bounds.1[i]);
-    let mut user: FxHashMap<PositionKey<f64>, u32> = FxHashMap::default();
-    let mut shared: FxHashSet<PositionKey<f64>> = FxHashSet::default();
+    // The first block that uses a position, and the last.
+    let mut users: FxHashMap<PositionKey<f64>, [u32; 2]> = FxHashMap::default();
     for (number, bounds) in blocks.iter().enumerate() {
         let others: Vec<&Bounds> = blocks
             .iter()
@@ -39,17 +54,19 @@ where
         if others.is_empty() {
             continue;
         }
+        let block = number as u32;
         for position in positions(number) {
             if !others.iter().any(|other| holds(other, &position)) {
                 continue;
             }
             let key = key(position);
-            if *user.entry(key).or_insert(number as u32) != number as u32 {
-                shared.insert(key);
+            let [first, last] = users.entry(key).or_insert([block; 2]);
+            if *last != block {
+                *last = block;
+                found(key, *first as usize, number);
             }
         }
     }
-    shared
 }
 
 /// Marks the shared vertices of a block, if it has any, as lying on a border that never thins.

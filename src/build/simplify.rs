@@ -187,18 +187,14 @@ pub fn simplify(
     if candidates.is_empty() {
         return best;
     }
-    // Within the budget and nearest to the input; else the fewest triangles.
+    let share = (source.mesh.area() / target as f64).sqrt();
     let mut from_source = MeanDistance::from(&source.mesh);
-    let mut rank = |candidate: &Simplified, best: (u8, f64)| {
-        let triangles = candidate.mesh.triangles.len();
-        if triangles <= limit {
-            let nearest = if best.0 == 0 { best.1 } else { f64::INFINITY };
-            (0, from_source.to(&candidate.mesh, nearest))
-        } else {
-            (1, triangles as f64)
-        }
+    let mut rank = |candidate: &Simplified, best: (Rank, f64)| {
+        let nearest = if best.0 == Rank::Near { best.1 } else { f64::INFINITY };
+        let distance = || from_source.to(&candidate.mesh, nearest);
+        Rank::of(candidate.mesh.triangles.len(), limit, distance, share)
     };
-    let mut best = (rank(&best, (1, f64::INFINITY)), best);
+    let mut best = (rank(&best, (Rank::FarOver, f64::INFINITY)), best);
     for candidate in candidates {
         let rank = rank(&candidate, best.0);
         if !candidate.mesh.triangles.is_empty() && rank.partial_cmp(&best.0) == Some(Ordering::Less)
@@ -207,6 +203,41 @@ pub fn simplify(
         }
     }
     best.1
+}
+
+/// How a candidate does, the best first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Rank {
+    /// Within the budget: the nearest to the input is taken.
+    Near,
+    /// Over it, by half of itself at most: that with the fewest triangles.
+    Over,
+    /// On average farther from the input than a square is wide that is as large as a triangle may
+    /// be, so that whole sides are gone: the nearest.
+    Far,
+    /// Far over the budget: that with the fewest triangles.
+    FarOver,
+}
+
+impl Rank {
+    /// The rank of a candidate with so many triangles and so far from the input, and by what it is
+    /// compared with those of the same rank; less is better.
+    fn of(
+        triangles: usize,
+        limit: usize,
+        distance: impl FnOnce() -> f64,
+        share: f64,
+    ) -> (Self, f64) {
+        if triangles > 2 * limit {
+            return (Self::FarOver, triangles as f64);
+        }
+        let distance = distance();
+        match (triangles <= limit, distance <= share) {
+            (true, true) => (Self::Near, distance),
+            (false, true) => (Self::Over, triangles as f64),
+            (_, false) => (Self::Far, distance),
+        }
+    }
 }
 
 /// Whether vertices may differ in more than their place.
@@ -541,6 +572,22 @@ mod tests {
         assert!(kept.triangles.iter().all(|[a, b, c]| a != b && b != c && c != a));
         // What joined them is gone.
         assert!(kept.area() < 400.0, "{}", kept.area());
+    }
+
+    #[test]
+    fn a_budget_is_no_reason_to_leave_out_whole_sides() {
+        // The second of each pair is worse; the share of a triangle is 4 m wide.
+        let of = |triangles, distance| Rank::of(triangles, 100, || distance, 4.0);
+        for [better, worse] in [
+            [of(90, 1.0), of(20, 2.0)],
+            [of(90, 3.9), of(101, 0.0)],
+            [of(150, 3.0), of(160, 1.0)],
+            [of(200, 3.0), of(6, 12.0)],
+            [of(90, 5.0), of(150, 6.0)],
+            [of(90, f64::INFINITY), of(201, 0.0)],
+        ] {
+            assert!(better < worse, "{better:?} {worse:?}");
+        }
     }
 
     /// Houses of 12 triangles each, all apart.

@@ -7,7 +7,9 @@
 //! are, both sides reach the original polyline and nothing shows between them. A leaf follows the
 //! original exactly and needs none.
 //!
-//! Where several pieces of the border have the same edge, each has a skirt on it.
+//! Where several pieces of the border have the same edge, each has a skirt on it. Where the mesh has
+//! no such edge, because what ended there closed up when the border thinned, the neighbour is open
+//! there all the same: the skirt stands alone, and looks like the nearest edge that there is.
 //!
 //! An end of the edge may lie beside the plane rather than on it ([`super::cut`]). From there to
 //! the polyline's next vertex the region leaves the plane, and a triangle closes that part.
@@ -32,8 +34,8 @@ pub struct Skirt {
 /// The rectangles reach this share of their own width beyond the polyline.
 const MARGIN: f64 = 0.02;
 
-/// The skirts that a node needs whose border on `path` is made of `runs`; those whose edge the mesh
-/// has not have nothing to hang on. `step` is the lattice step in metres.
+/// The skirts that a node needs whose border on `path` is made of `runs`. `step` is the lattice step
+/// in metres.
 pub fn skirts(
     mesh: &Mesh,
     border: &Border,
@@ -47,12 +49,22 @@ pub fn skirts(
         if points.len() < 3 {
             return None;
         }
-        let &edge = edges.get(&run.edge(path))?;
         let plane = path.plane(run.plane());
-        let run = Run { points, axis: plane.axis, coordinate: plane.coordinate };
-        Some(Skirt::new(edge, run, mesh.positions[edge[0] as usize], step))
+        let around = Run { points, axis: plane.axis, coordinate: plane.coordinate };
+        match edges.get(&run.edge(path)) {
+            Some(&edge) => Some(Skirt::new(edge, around, mesh.positions[edge[0] as usize], step)),
+            None => Some(Skirt::alone(nearest_edge(mesh, points[0])?, around, step)),
+        }
     };
     runs.iter().filter_map(covered).collect()
+}
+
+/// An edge of the triangle corner nearest to a place; the first of equals.
+fn nearest_edge(mesh: &Mesh, place: [f32; 3]) -> Option<[u32; 2]> {
+    let from =
+        |edge: &[u32; 2]| wide(mesh.positions[edge[0] as usize]).distance_squared(wide(place));
+    let edges = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    edges.min_by(|a, b| from(a).total_cmp(&from(b)))
 }
 
 /// The part of a border's original polyline that is still to be covered, and its plane.
@@ -70,6 +82,19 @@ impl Skirt {
         let ends = if run.points[0] == start { [0, 1] } else { [1, 0] };
         skirt.close_ends(&mut run, ends);
         skirt.cover(&run, ends, step);
+        skirt
+    }
+
+    /// A skirt whose ends are no vertices of the mesh, which looks like some edge of it.
+    fn alone(edge: [u32; 2], run: Run, step: f64) -> Self {
+        let (first, last) = (run.points[0], run.points[run.points.len() - 1]);
+        let mut skirt = Self::new(edge, run, first, step);
+        if skirt.triangles.as_flattened().iter().any(|&corner| corner < 2) {
+            let ends = [skirt.corner(first, 0), skirt.corner(last, 1)];
+            for corner in skirt.triangles.as_flattened_mut().iter_mut().filter(|at| **at < 2) {
+                *corner = ends[usize::from(*corner)];
+            }
+        }
         skirt
     }
 
@@ -225,6 +250,24 @@ mod tests {
         assert_eq!(both.triangles.len(), 4);
         let least = over(&[start, inner[0], end]);
         assert_eq!(least.triangles, [[0, 2, 1]]);
+    }
+
+    #[test]
+    fn a_skirt_without_an_edge_has_all_its_corners() {
+        let points = [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 2.0, 1.0], [0.0, 3.0, 0.0]];
+        let run = || Run { points: &points, axis: 0, coordinate: 0.0 };
+        let (hung, alone) = (over(&points), Skirt::alone([3, 4], run(), 1e-6));
+        assert_eq!(alone.edge, [3, 4]);
+        let places = |skirt: &Skirt| -> Vec<[[f32; 3]; 3]> {
+            let place = |corner: u8| match corner {
+                0 => points[0],
+                1 => points[3],
+                _ => skirt.corners[usize::from(corner) - 2].0,
+            };
+            skirt.triangles.iter().map(|triangle| triangle.map(place)).collect()
+        };
+        assert_eq!(places(&hung), places(&alone));
+        assert!(alone.triangles.as_flattened().iter().all(|&corner| corner >= 2));
     }
 
     #[test]

@@ -17,7 +17,6 @@ mod mtl;
 mod obj;
 mod paths;
 mod picture;
-mod polygon;
 mod spent;
 mod textures;
 mod tokens;

@@ -111,4 +111,18 @@ impl<C: Coordinate> Mesh<C> {
         self.materials.push(self.materials[vertex]);
         index
     }
+
+    /// Appends a copy of a vertex of another mesh that has the same arrays.
+    pub fn push_copy_of(&mut self, other: &Self, vertex: usize) -> u32 {
+        let index = self.positions.len() as u32;
+        self.positions.push(other.positions[vertex]);
+        if !self.texcoords.is_empty() {
+            self.texcoords.push(other.texcoords[vertex]);
+        }
+        if !self.colors.is_empty() {
+            self.colors.push(other.colors[vertex]);
+        }
+        self.materials.push(other.materials[vertex]);
+        index
+    }
 }

@@ -15,11 +15,11 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::geometry::NodeGeometry;
-use super::runs::Runs;
 use super::sample::cross;
 use super::seams::Seam;
 use super::tree::{apart, is_leaf, leaves, line};
 use crate::format::{Node, Scene};
+use crate::mesh::Runs;
 use crate::mesh::{PositionKey, key};
 
 /// How far a triangle in a cutting plane may be from it, as a share of its longest edge. A border
@@ -110,7 +110,7 @@ fn stand_alone(node: &NodeGeometry) -> Vec<bool> {
     tops.into_iter().map(|top| counts[top as usize] <= MOST_TOGETHER).collect()
 }
 
-/// The plane that holds most of the edges between two leaves and separates their boxes.
+/// The plane that holds most of the edges between two leaves and separates their boxes' middles.
 fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<Plane> {
     let mut best: Option<(f64, Plane)> = None;
     for axis in 0..3 {
@@ -126,15 +126,13 @@ fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<Plane
         let Some((&bits, &count)) = counts.iter().max_by_key(|&(_, &count)| count) else {
             continue;
         };
-        // Vertices near the plane count as on it, so a few edges lie beside it, and boxes may
-        // overlap by a little. Leaves that are flat along the axis are not cut across it.
+        // Vertices near the plane count as on it, so a few edges lie beside it, and small bodies
+        // are not cut at all: boxes may overlap, but each has its middle on its own side. Leaves
+        // that are flat along the axis are not cut across it.
         let coordinate = f64::from_bits(bits);
         let side = |node: &Node| node.bbox_max[axis] - node.bbox_min[axis];
         let slack = 4.0 * step + BESIDE * side(a).min(side(b));
-        let between = low.bbox_max[axis] <= coordinate + slack
-            && high.bbox_min[axis] >= coordinate - slack
-            && middle(low) < coordinate - slack
-            && middle(high) > coordinate + slack;
+        let between = middle(low) < coordinate - slack && middle(high) > coordinate + slack;
         let apart = middle(high) - middle(low);
         if between && 2 * count >= seams.len() && best.is_none_or(|(most, _)| apart > most) {
             best = Some((apart, (axis, bits)));

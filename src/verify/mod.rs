@@ -33,7 +33,6 @@ mod options;
 mod points;
 mod progress;
 mod report;
-mod runs;
 mod sample;
 mod seams;
 mod source;

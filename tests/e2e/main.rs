@@ -9,6 +9,7 @@ mod crash;
 mod determinism;
 mod encodings;
 mod golden;
+mod houses;
 mod incremental;
 mod output;
 mod paths;

@@ -6,9 +6,9 @@ use std::ops::Range;
 use rustc_hash::FxHashMap;
 
 use super::super::clean::Tally;
-use super::super::polygon::Triangulator;
 use super::super::vertices::{NONE, Pair, Unifier};
 use super::statements::Statements;
+use crate::mesh::Triangulator;
 
 /// Consecutive faces of one part.
 pub(super) struct Run {

@@ -1,7 +1,7 @@
 //! What is connected: numbers joined into runs (union-find).
 
 /// Numbers from 0, joined into runs.
-pub(super) struct Runs(Vec<u32>);
+pub(crate) struct Runs(Vec<u32>);
 
 impl Runs {
     /// So many numbers, each alone.

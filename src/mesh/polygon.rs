@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3};
 
 /// Turns polygons into triangles; keeps its buffers from one polygon to the next.
 #[derive(Default)]
-pub(super) struct Triangulator {
+pub(crate) struct Triangulator {
     /// Built at the first polygon that needs it.
     earcut: Option<earcut::Earcut<f64>>,
     /// Corners without consecutive repetitions, as indices into the caller's.
@@ -25,7 +25,7 @@ impl Triangulator {
     ///
     /// Corners must be finite. Consecutive corners at the same place count as one. None where the
     /// polygon has no area.
-    pub(super) fn triangulate(&mut self, corners: &[[f64; 3]]) -> &[[u32; 3]] {
+    pub(crate) fn triangulate(&mut self, corners: &[[f64; 3]]) -> &[[u32; 3]] {
         self.triangles.clear();
         self.ring.clear();
         for (at, corner) in corners.iter().enumerate() {

@@ -1,0 +1,78 @@
+//! Separate houses in one group, which planes would run through by the hundred.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use hlod::format::Scene;
+use hlod::verify::{Silent, VerifyOptions, verify};
+use tempfile::TempDir;
+
+use crate::support::inputs::write;
+use crate::support::{Random, run_build};
+
+/// A town without groups: 1,500 closed shells with gables, of 16 triangles, at odd angles; each of
+/// `halls` in a hundred of them fifteen times as large.
+fn town(folder: &Path, halls: usize) {
+    let mut random = Random(5);
+    let mut text = String::new();
+    for house in 0..1500 {
+        let size = if random.below(100) < halls { 15.0 } else { 1.0 };
+        let (x, y) = (random.within(0.0, 1600.0), random.within(0.0, 700.0));
+        let [width, depth] = [(6.0, 12.0), (8.0, 16.0)].map(|(a, b)| size * random.within(a, b));
+        let height = random.within(3.0, 12.0);
+        let (sine, cosine) = random.within(0.0, 3.0).sin_cos();
+        let mut corner = |i: f64, j: f64, z: f64| {
+            let (i, j) = ((i - 0.5) * width, (j - 0.5) * depth);
+            let [x, y] = [x + cosine * i - sine * j, y + sine * i + cosine * j];
+            writeln!(text, "v {x:.3} {y:.3} {z:.3}").unwrap();
+        };
+        for z in [0.0, height] {
+            [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(i, j)| corner(i, j, z));
+        }
+        [0.0, 1.0].map(|j| corner(0.5, j, height + 3.0));
+        let faces: [&[usize]; 7] = [
+            &[1, 4, 3, 2],
+            &[1, 2, 6, 9, 5],
+            &[2, 3, 7, 6],
+            &[3, 4, 8, 10, 7],
+            &[4, 1, 5, 8],
+            &[5, 9, 10, 8],
+            &[9, 6, 7, 10],
+        ];
+        for face in faces {
+            let corners = face.iter().map(|corner| (house * 10 + corner).to_string());
+            writeln!(text, "f {}", corners.collect::<Vec<_>>().join(" ")).unwrap();
+        }
+    }
+    write(folder, "town.obj", text);
+}
+
+fn built(halls: usize) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    town(folder.path(), halls);
+    run_build(folder.path(), &["--quiet", "--desired-tris", "300", "town.obj", "out"]);
+    folder
+}
+
+#[test]
+fn small_houses_are_not_cut() {
+    let folder = built(0);
+    let scene = Scene::read(&folder.path().join("out")).unwrap();
+    let leaves = scene.nodes.iter().filter(|node| node.first_child.is_none());
+    assert_eq!(leaves.map(|node| u64::from(node.triangles)).sum::<u64>(), 1500 * 16);
+    assert!(scene.nodes.iter().map(|node| node.level).max() > Some(2));
+}
+
+#[test]
+fn a_half_that_goes_leaves_the_other_half_closed() {
+    // Halls are wider than half of what a node is cut into, and so are cut.
+    let folder = built(15);
+    let out = folder.path().join("out");
+    let options = VerifyOptions { samples: 40_000, ..VerifyOptions::default() };
+    let report = verify(&out, &[folder.path().join("town.obj")], &options, &Silent).unwrap();
+    let failed: Vec<_> = report.checks.iter().filter(|check| !check.passed).collect();
+    assert!(failed.is_empty(), "{failed:?}");
+    let open = report.gaps.iter().map(|gap| gap.open).fold(0.0, f64::max);
+    let without_skirts = report.gaps.iter().map(|gap| gap.bare).fold(0.0, f64::max);
+    assert!(open < 1e-3 && without_skirts > 1.0, "{open} {without_skirts}");
+}
