@@ -12,7 +12,7 @@ use crate::mesh::{Model, UpAxis};
 #[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BlockMode {
-    /// Groups where they make sense, merged where tiny, divided where huge or absent.
+    /// Groups where they make sense, merged where tiny or one surface, divided where huge or absent.
     #[default]
     Auto,
     /// Every group of the source is a block.

@@ -27,9 +27,12 @@ fn town(folder: &Path, halls: usize) {
             writeln!(text, "v {x:.3} {y:.3} {z:.3}").unwrap();
         };
         for z in [0.0, height] {
-            [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(i, j)| corner(i, j, z));
+            for (i, j) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
+                corner(i, j, z);
+            }
         }
-        [0.0, 1.0].map(|j| corner(0.5, j, height + 3.0));
+        corner(0.5, 0.0, height + 3.0);
+        corner(0.5, 1.0, height + 3.0);
         let faces: [&[usize]; 7] = [
             &[1, 4, 3, 2],
             &[1, 2, 6, 9, 5],
