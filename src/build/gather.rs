@@ -122,7 +122,8 @@ fn halves(
         let middle = median_of_triangles(&piece.mesh, axis);
         lattice.map_or(middle, |lattice| lattice.round(middle))
     };
-    let axis = stages.time(Stage::Gather, || axis_to_cut(&piece.mesh, |axis| vec![middle(axis)]));
+    let axis =
+        stages.time(Stage::Gather, || axis_to_cut(&piece.mesh, |axis| vec![middle(axis)], 0.0));
     let Some(axis) = axis else { return vec![piece] };
     let middle = middle(axis);
     if !(middle > low[axis] && middle < high[axis]) || piece.path.len() >= 12 {

@@ -194,6 +194,25 @@ pub struct BlockBuilder<'a, S> {
     pub stages: &'a Stages,
 }
 
+/// The box of a piece without what small bodies reach beyond the planes that it was cut at
+/// ([`super::whole`]): slabs stay as even as their planes are.
+fn bounds_within_cuts(piece: &Piece) -> Option<([f32; 3], [f32; 3])> {
+    let (mut low, mut high) = piece.mesh.bounds()?;
+    for bit in 0..piece.path.len() as u32 {
+        let plane = piece.path.plane(bit);
+        let (axis, at) = (plane.axis, plane.coordinate);
+        let (below, above) = (at - low[axis], high[axis] - at);
+        if below > 0.0 && above > 0.0 {
+            if below < above {
+                low[axis] = at;
+            } else {
+                high[axis] = at;
+            }
+        }
+    }
+    Some((low, high))
+}
+
 /// A node's geometry as its parent needs it.
 struct Carried {
     mesh: Mesh,
@@ -304,16 +323,17 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
     /// Cuts a piece by `level_factor - 1` planes at even distances ([`super::cut_axis`]); pieces
     /// without triangles are left out.
     pub fn divide(&self, piece: Piece, level: usize) -> Vec<Piece> {
-        let Some((low, high)) = piece.mesh.bounds() else { return vec![piece] };
+        let Some((low, high)) = bounds_within_cuts(&piece) else { return vec![piece] };
         let slabs = self.options.level_factor;
-        let even = |axis: usize| -> Vec<f32> {
+        let planes = |axis: usize| -> Vec<f32> {
             let (low, high) = (f64::from(low[axis]), f64::from(high[axis]));
             let at = |i| low + (high - low) * (f64::from(i) / f64::from(slabs));
-            (1..slabs).map(|i| self.lattice.round(at(i)) as f32).collect()
+            let even = (1..slabs).map(|i| self.lattice.round(at(i)) as f32);
+            even.map(|even| self.through_vertices(&piece.mesh, axis, even)).collect()
         };
-        let Some(axis) = axis_to_cut(&piece.mesh, even) else { return vec![piece] };
-        let through = |even| self.through_vertices(&piece.mesh, axis, even);
-        let planes: Vec<f32> = even(axis).into_iter().map(through).collect();
+        let slack = self.options.tolerance.sliver_steps * self.lattice.step;
+        let Some(axis) = axis_to_cut(&piece.mesh, planes, slack) else { return vec![piece] };
+        let planes = planes(axis);
         let shares: Vec<f64> = self.factors[level + 1..]
             .iter()
             .map(|factor| match self.options.borders {

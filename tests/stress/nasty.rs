@@ -55,7 +55,7 @@ fn real_broken_files_build_and_verify() {
             Chain::new(&near, &options()).unwrap().figures(&path, 1.0)
         });
         let twin = Twin::several("the same at the origin", all.collect());
-        let bounds: Bounds = &[("RMS", 0.12)];
+        let bounds: Bounds = &[("RMS", 0.12), ("nodes", 0.06)];
         table.within(&name, &chain.own_figures(), &twin, bounds, "rounded to other points");
     }
     table.finish();

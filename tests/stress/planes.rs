@@ -68,10 +68,10 @@ fn check(table: &mut Table, name: &str, options: &BuildOptions, same_blocks: boo
         ("triangles drawn", f64::INFINITY),
         ("frame", 0.1),
         ("expected", 0.1),
-        ("stored", 0.1),
+        ("stored", 0.4),
         ("colour", 0.02),
     ];
-    let why = "fewer triangles, since none is cut";
+    let why = "fewer triangles, since none is cut; planes amid triangles may be level instead";
     let twin = Twin::several("planes amid triangles", apart.into());
     table.within("vertices on the planes", &figures_on, &twin, bounds, why);
 }
