@@ -89,7 +89,7 @@ fn specks_change_nothing() {
             ("triangles, level", 0.03),
             ("triangles drawn", 0.03),
             ("nodes", 0.05),
-            ("stored", 0.25),
+            ("stored", 0.75),
         ],
         "wide ones keep some of the budget",
     );
