@@ -7,7 +7,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use hlod::import::decode_texture;
+use hlod::decode::decode_texture;
 use hlod::mesh::{TextureData, TextureSource};
 use jpeg_encoder::{ColorType, Encoder};
 use rayon::prelude::*;

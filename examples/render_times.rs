@@ -118,6 +118,7 @@ fn ground(node: u32, across: u32, textured: bool) -> NodeMesh {
         texcoords: if textured { texcoords } else { Vec::new() },
         colors: Vec::new(),
         indices: corners.collect(),
+        skirt_triangles: 0,
         surface,
     };
     NodeMesh { origin: origin.map(f64::from), images, primitives: vec![primitive] }

@@ -12,9 +12,9 @@ use std::path::Path;
 use hlod::bench::ClockConstants;
 use hlod::camera::{format_path, parse_path};
 use hlod::format::{NodeLabel, Scene, file_crc, read_glb, write_glb};
-use hlod::import;
 use hlod::mesh::{Model, UpAxis};
 use hlod::{Error, Result};
+use hlod::{decode, import};
 
 /// What can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,8 +121,8 @@ fn picture(folder: &Path, name: &str, bytes: &[u8]) -> bool {
     put(folder, "m.obj", OBJ_OF_MTL);
     let model = import::load(&folder.join("m.obj")).unwrap();
     let Some(texture) = model.textures.first() else { return false };
-    let size = refused_or(import::texture_size(texture));
-    let decoded = refused_or(import::decode_texture(texture));
+    let size = refused_or(decode::texture_size(texture));
+    let decoded = refused_or(decode::decode_texture(texture));
     if let (Some(size), Some(decoded)) = (size, &decoded) {
         assert_eq!((decoded.width, decoded.height), size, "header and picture");
     }

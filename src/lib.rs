@@ -6,16 +6,20 @@
 //! The library neither prints nor exits nor panics on input; only the programs do.
 
 pub mod bench;
-pub mod build;
+pub mod builder;
 pub mod camera;
 pub mod city;
+pub mod cpu_time;
+pub mod decode;
 pub mod error;
 pub mod format;
 pub mod import;
+pub mod lattice;
 pub mod loading;
 pub mod mesh;
 pub mod picture_error;
 pub mod place;
+pub mod random;
 pub mod render;
 pub mod report;
 pub mod runtime;
@@ -23,6 +27,6 @@ pub mod texture;
 pub mod tileset;
 pub mod verify;
 
-mod random;
+mod color;
 
 pub use error::{Error, Result};

@@ -65,6 +65,7 @@ fn node_file() -> Vec<u8> {
             texcoords: vec![[0.0; 2]; 4],
             colors: vec![[1; 4]; 4],
             indices: vec![0, 1, 2, 0, 2, 3],
+            skirt_triangles: 0,
             surface: Surface {
                 base_color: [1.0; 4],
                 image: Some(0),
@@ -105,6 +106,8 @@ fn scene_file() -> Vec<u8> {
             static_benefit: 1.0,
             average_normal: [0.0, 1.0, 0.0],
             geometric_error: 0.0,
+            mean_error: 0.0,
+            p95_error: 0.0,
             texels: 16,
             pictures: vec![[8, 2]],
             shared_texels: 0,

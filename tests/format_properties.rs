@@ -75,6 +75,8 @@ prop_compose! {
                 static_benefit: error * 3.0,
                 average_normal: [[0.0; 3], [0.0, 0.6, -0.8], [1.0, 0.0, 0.0]][index % 3],
                 geometric_error: above.map_or(error, |above| above.geometric_error.min(error)),
+                mean_error: 0.0,
+                p95_error: 0.0,
                 texels: 6 * (big & 0xFFFF),
                 pictures: vec![[2, (big & 0xFFFF) as u32], [(big & 0xFFFF) as u32, 4]],
                 shared_texels: big >> 1,
@@ -144,7 +146,7 @@ prop_compose! {
         surface in Just(surface),
     ) -> Primitive {
         let indices = indices.as_flattened().iter().map(|i| i.index(positions.len()) as u32);
-        Primitive { indices: indices.collect(), positions, texcoords, colors, surface }
+        Primitive { skirt_triangles: 0, indices: indices.collect(), positions, texcoords, colors, surface }
     }
 }
 

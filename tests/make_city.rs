@@ -1,34 +1,18 @@
 //! The generator's command line: files, messages and exit codes.
 
+#[path = "e2e/support/files.rs"]
+mod files;
+
 use std::fs;
-use std::path::Path;
 
 use assert_cmd::Command;
+use files::contents;
 use hlod::city::{City, CityOptions};
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
 
 fn make_city() -> Command {
     Command::cargo_bin("make-city").unwrap()
-}
-
-/// All files below a folder with their bytes, by relative path.
-fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
-    let mut files = Vec::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(next) = folders.pop() {
-        for entry in fs::read_dir(next).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let name = path.strip_prefix(folder).unwrap().to_str().unwrap().to_owned();
-                files.push((name, fs::read(&path).unwrap()));
-            }
-        }
-    }
-    files.sort();
-    files
 }
 
 const SMALL: [&str; 4] = ["--blocks", "5", "--triangles", "20000"];
@@ -190,8 +174,8 @@ fn a_city_without_textures_has_no_texture_coordinates() {
         .success()
         .stdout("");
     let files = contents(place.path());
-    assert_eq!(files.iter().map(|(name, _)| name).collect::<Vec<_>>(), ["city.mtl", "city.obj"]);
-    let text = String::from_utf8(files[1].1.clone()).unwrap();
+    assert_eq!(files.keys().collect::<Vec<_>>(), ["city.mtl", "city.obj"]);
+    let text = String::from_utf8(files["city.obj"].clone()).unwrap();
     assert!(!text.contains("vt ") && !text.contains('/'));
     let faces = text.lines().filter(|line| line.starts_with("f ")).count();
     let expected: usize =

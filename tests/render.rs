@@ -72,6 +72,7 @@ fn rectangle(
         },
         colors: Vec::new(),
         indices: vec![0, 1, 2, 0, 2, 3],
+        skirt_triangles: 0,
         surface,
     }
 }

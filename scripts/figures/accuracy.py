@@ -8,7 +8,7 @@ import shutil
 import subprocess
 
 from common import (
-    ROOT,
+    DOCS,
     Options,
     Programs,
     machine,
@@ -59,10 +59,9 @@ def main():
     short = paragraphs([whole, heights])
     print(text, short, sep="\n")
     if arguments.write:
-        plot(results, ROOT / "docs" / "accuracy.svg")
-        write_between_markers(ROOT / "docs" / "accuracy.md", "figures", text)
-        write_between_markers(ROOT / "docs" / "accuracy.md", "whole", short)
-        write_between_markers(ROOT / "README.md", "accuracy", short)
+        plot(results, DOCS / "accuracy.svg")
+        write_between_markers(DOCS / "accuracy.md", "figures", text)
+        write_between_markers(DOCS / "accuracy.md", "whole", short)
 
 
 def parse():

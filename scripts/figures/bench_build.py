@@ -6,6 +6,7 @@ import statistics
 import subprocess
 
 from common import (
+    DOCS,
     ROOT,
     Options,
     Programs,
@@ -44,12 +45,12 @@ def main():
     cities = [run for run in runs if run["texels"]]
     findings = [scaling(runs, threads), jpeg_table(programs, arguments, runs, threads)]
     about = [machine(), conditions(arguments)]
-    short = paragraphs(about + [main_table(cities)] + findings)
     full = paragraphs(about + [main_table(runs), stage_table(runs)] + findings)
     print(full)
     if arguments.write:
-        write_between_markers(ROOT / "docs" / "benchmarks.md", "figures", full)
-        write_between_markers(ROOT / "README.md", "figures", short)
+        write_between_markers(DOCS / "benchmarks.md", "figures", full)
+        short = paragraphs([summary_table(cities), machine()])
+        write_between_markers(ROOT / "README.md", "summary", short)
 
 
 def paragraphs(parts):
@@ -109,9 +110,14 @@ def triangles(run):
     return run["report"]["source_triangles"]
 
 
+HEAD = ["input", "threads", "triangles", "seconds", "triangles/s", "peak memory"]
+
+
 def main_table(runs):
-    head = ["input", "threads", "triangles", "seconds", "triangles/s", "peak memory"]
-    head += ["bytes a triangle", "texels", "nodes"]
+    return table([*HEAD, "bytes a triangle", "texels", "nodes"], rows_of(runs))
+
+
+def rows_of(runs):
     rows = []
     for run in runs:
         report = run["report"]
@@ -129,7 +135,13 @@ def main_table(runs):
                 f"{sum(level['nodes'] for level in report['levels']):,}",
             ]
         )
-    return table(head, rows)
+    return rows
+
+
+def summary_table(runs):
+    """The generated cities with all threads, in fewer columns: what the README shows."""
+    most = max(run["threads"] for run in runs)
+    return table(HEAD, [row[: len(HEAD)] for row in rows_of(runs) if row[1] == str(most)])
 
 
 def stage_table(runs):
@@ -163,7 +175,7 @@ def scaling(runs, threads):
 
 
 def jpeg_table(programs, arguments, runs, threads):
-    """The build against decoding and encoding the same pictures and nothing else."""
+    """The build against decoding and encoding the same textures and nothing else."""
     rows = []
     for run in (run for run in runs if run["texels"] == THESIS_TEXELS):
         folder = run["models"][0].parent / "city_textures"
@@ -186,7 +198,7 @@ def jpeg_table(programs, arguments, runs, threads):
         )
     head = ["threads", "texels", "JPEG alone, s", "whole build, s", "ratio"]
     text = f"The city with {THESIS_TEXELS} texels a triangle against decoding and encoding its "
-    return text + "pictures, by the same libraries, and nothing else:\n\n" + table(head, rows)
+    return text + "textures, by the same libraries, and nothing else:\n\n" + table(head, rows)
 
 
 if __name__ == "__main__":

@@ -2,9 +2,9 @@
 
 import subprocess
 
-from common import ROOT, Programs, machine, table, write_between_markers
+from common import DOCS, Programs, machine, table, write_between_markers
 
-DOCUMENT = ROOT / "docs" / "runs.md"
+DOCUMENT = DOCS / "runs.md"
 
 
 def columns(programs, example):

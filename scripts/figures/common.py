@@ -13,11 +13,12 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
+DOCS = ROOT / "docs"
 DATA = Path(os.environ.get("HLOD_DATA", ROOT.parent / "shared" / "data"))
 
 
 class Options(argparse.ArgumentParser):
-    """The options of a script that writes its figures into the documents.
+    """The options of a script that writes its figures into the pages of docs/.
 
     `quick` says what --quick does: None where the script has no such option, `runs` what --runs
     counts and its default. With --quick nothing is written.
@@ -182,10 +183,10 @@ def memory_bytes():
 
 
 def texels_written(result):
-    """Texels of all nodes' own pictures and of those that they share."""
+    """Texels of all nodes' own textures and of those that they share."""
     shared = result["scene"]["shared_textures"]
     return sum(level["texels"] for level in result["report"]["levels"]) + sum(
-        picture["width"] * picture["height"] for picture in shared
+        texture["width"] * texture["height"] for texture in shared
     )
 
 

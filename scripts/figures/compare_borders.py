@@ -3,7 +3,7 @@
 import statistics
 
 from common import (
-    ROOT,
+    DOCS,
     Options,
     Programs,
     machine,
@@ -49,7 +49,7 @@ def main():
     text = "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
     print(text)
     if arguments.write:
-        write_between_markers(ROOT / "docs" / "choices.md", "figures", text)
+        write_between_markers(DOCS / "choices.md", "figures", text)
 
 
 def parse():

@@ -4,7 +4,7 @@ import resource
 import shutil
 import subprocess
 
-from common import ROOT, Options, Programs, machine, real_data, run, say, table, write_between_markers
+from common import DOCS, Options, Programs, machine, real_data, run, say, table, write_between_markers
 
 ENCODINGS = [
     ("plain", []),
@@ -32,13 +32,13 @@ def main():
     head = ["", "", "nodes, MB", "of it geometry", "source, MB", "build, s", "load, ms"]
     text = (
         machine()
-        + "\n\nProcessor seconds to build; milliseconds to read all nodes on one thread, pictures"
-        + " not decoded; source is the model with its pictures.\n\n"
+        + "\n\nProcessor seconds to build; milliseconds to read all nodes on one thread, textures"
+        + " not decoded; source is the model with its textures.\n\n"
         + table(head, rows)
     )
     print(text)
     if arguments.write:
-        write_between_markers(ROOT / "README.md", "encodings", text)
+        write_between_markers(DOCS / "encodings.md", "encodings", text)
 
 
 def measure(programs, name, models, runs):
@@ -56,8 +56,8 @@ def measure(programs, name, models, runs):
             work = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
             spent = min(spent, work)
         command = [programs.path("examples/load_nodes"), str(2 * runs), str(out)]
-        nodes, pictures, load = subprocess.check_output(command, text=True).split()
-        geometry = int(nodes) - int(pictures)
+        nodes, textures, load = subprocess.check_output(command, text=True).split()
+        geometry = int(nodes) - int(textures)
         yield [
             name,
             encoding,
@@ -71,7 +71,7 @@ def measure(programs, name, models, runs):
 
 
 def source_bytes(models):
-    """Bytes of the models with all pictures and material files beside them."""
+    """Bytes of the models with all textures and material files beside them."""
     kinds = (".obj", ".mtl", ".glb", ".jpg", ".png")
     files = {
         file

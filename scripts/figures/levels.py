@@ -4,7 +4,7 @@ import json
 import shutil
 import subprocess
 
-from common import ROOT, Options, Programs, real_data, run, say, write_between_markers
+from common import DOCS, Options, Programs, real_data, run, say, write_between_markers
 
 # Folder of the real data and where to look at it from, if not from above its south.
 SETS = {
@@ -18,7 +18,7 @@ SETS = {
     "3dfier": ["--fov", "36"],
 }
 SIZE = "480x360"
-PAGE = ROOT / "docs" / "levels.md"
+PAGE = DOCS / "levels.md"
 
 
 def main():
@@ -45,7 +45,7 @@ def section(programs, name, models, write):
     if done.returncode not in (0, 3):
         raise SystemExit(f"exit code {done.returncode} from {' '.join(command)}")
     level = json.loads(done.stdout)["levels"][0]
-    folder = ROOT / "docs" / "levels" if write else programs.work
+    folder = DOCS / "levels" if write else programs.work
     folder.mkdir(exist_ok=True)
     pictures = [programs.work / f"levels-{side}.png" for side in ("coarse", "source")]
     for picture, front in zip(pictures, (["--level", "0"], ["--leaves"])):

@@ -4,7 +4,7 @@ import json
 import os
 import subprocess
 
-from common import ROOT, Options, Programs, machine, real_data, run, say, table, write_between_markers
+from common import DOCS, Options, Programs, machine, real_data, run, say, table, write_between_markers
 
 # The thesis's city has 25 blocks in its largest experiment; as many triangles as fit a small
 # machine and a run of minutes.
@@ -54,8 +54,7 @@ def main():
     )
     print(text)
     if arguments.write:
-        write_between_markers(ROOT / "docs" / "runs.md", "runs", text)
-        write_between_markers(ROOT / "README.md", "runs", text)
+        write_between_markers(DOCS / "runs.md", "runs", text)
 
 
 def parse():
@@ -146,7 +145,7 @@ def floor(rows):
         for row in still
     ]
     return (
-        "The camera that stands still draws the same picture again and again; its times deviate "
+        "The camera that stands still draws the same image again and again; its times deviate "
         f"by {', '.join(parts)}, which no estimate can foresee."
     )
 
@@ -186,7 +185,7 @@ def toggles(row):
 
 
 def memory(rows):
-    head = ["scene, orbit under a cap", "cap, MiB", "peak, MiB", "of the cap, %", "made room"]
+    head = ["scene, orbit under a cap", "cap, MiB", "peak, MiB", "of the cap, %", "evicted"]
     body = [
         [
             row["scene"],

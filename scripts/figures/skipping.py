@@ -6,7 +6,7 @@ import resource
 import shutil
 import subprocess
 
-from common import ROOT, Options, Programs, machine, run, say, table, write_between_markers
+from common import DOCS, Options, Programs, machine, run, say, table, write_between_markers
 
 TRIANGLES = 400_000
 BLOCKS = 16
@@ -22,7 +22,7 @@ def main():
     text = machine() + "\n\n" + table(head, rows)
     print(text)
     if arguments.write:
-        write_between_markers(ROOT / "README.md", "skipping", text)
+        write_between_markers(DOCS / "skipping.md", "skipping", text)
 
 
 class Bench:
@@ -59,7 +59,7 @@ class Bench:
             for found in (report, plain_report)
         ]
         work = [sum(found.get(name, 0) for name in ("pictures", "atlas")) for found in stages]
-        yield ["pictures and atlases", "no textures", seconds(work[0]), seconds(work[1])]
+        yield ["textures and atlases", "no textures", seconds(work[0]), seconds(work[1])]
         yield ["the same, whole build", "no textures", seconds(textured), seconds(plain)]
         whole, _ = self.build([self.plain], "--threads", "1", "--desired-tris", "10000000")
         cut = "cutting, simplifying, measuring"

@@ -5,7 +5,7 @@ import shutil
 import subprocess
 import sys
 
-from common import ROOT, Options, Programs, table, write_between_markers
+from common import DOCS, ROOT, Options, Programs, table, write_between_markers
 
 
 def main():
@@ -26,8 +26,8 @@ def main():
     if done.returncode != 0:
         sys.exit("some cases are not as their twins; nothing written")
     if arguments.write:
-        write_between_markers(ROOT / "docs" / "stress.md", "stress", text)
-        write_between_markers(ROOT / "README.md", "stress", summary(tables))
+        write_between_markers(DOCS / "stress.md", "stress", text)
+        write_between_markers(DOCS / "stress.md", "summary", summary(tables))
 
 
 def summary(tables):

@@ -7,12 +7,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use hlod::build::blocks::BlockMode;
-use hlod::build::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
-use hlod::build::pipeline::with_threads;
-use hlod::build::progress::Progress;
-use hlod::build::simplify::Simplifier;
-use hlod::build::{BuildOptions, Outcome, build};
+use hlod::builder::blocks::plan::BlockMode;
+use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom, TreeShape};
+use hlod::builder::pipeline::with_threads;
+use hlod::builder::progress::Progress;
+use hlod::builder::simplify::ladder::Simplifier;
+use hlod::builder::{BuildOptions, Outcome, build};
 use hlod::format::Scene;
 use hlod::mesh::UpAxis;
 use hlod::place::{Place, Placement};
@@ -28,10 +28,10 @@ const NOT_HELD: u8 = 3;
 /// Turns city meshes into a hierarchy of levels of detail.
 ///
 /// Reads OBJ, glTF and GLB files, or folders of them; divides them into blocks; and writes for
-/// every block a tree of nodes, coarse and whole at the root, original and in pieces at the
-/// leaves, as OUT/scene.hlod, OUT/nodes/*.glb and OUT/build.json, and as OUT/tileset.json for viewers
-/// of 3D Tiles. What stood in OUT before stays
-/// until the new result is complete. Where inputs and options have not changed, nothing is done.
+/// every block a tree of nodes, coarse at the root, the original triangles at the leaves. Writes
+/// OUT/scene.hlod (index), OUT/nodes/*.glb, OUT/tileset.json (3D Tiles) and OUT/build.json (report).
+/// An earlier result in OUT stays until the new one is complete. Where inputs and options have not
+/// changed, nothing is done.
 #[derive(Parser, Debug)]
 #[command(
     version,
@@ -76,18 +76,18 @@ struct VerifyArgs {
     /// One JSON object with all figures
     #[arg(long)]
     json: bool,
-    /// Points spread over the source by area, 1000 or more, and as many over each level; vertices
-    /// are measured besides. More: rarer faults are found, and it takes longer
+    /// Sample points on the source, 1000 or more, and as many on each level; all vertices are
+    /// measured as well. More: rarer faults are found, and it takes longer
     #[arg(long, value_name = "N", default_value_t = 300_000)]
     samples: u64,
-    /// Draws the points: the same figures for the same seed
+    /// Seed of the sample points: the same seed gives the same figures
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Measure a front of mixed levels too, cut where the stored errors say, of at most this share
-    /// of the leaves' triangles, over 0 to 1
+    /// Also measure a front of mixed levels, chosen by the stored errors, of at most this fraction
+    /// of the leaves' triangles, above 0 and up to 1
     #[arg(long, value_name = "SHARE")]
     front: Option<f64>,
-    /// Worst nodes to list
+    /// Number of worst nodes to list
     #[arg(long, value_name = "N", default_value_t = 5)]
     worst: usize,
     /// Threads, 0-1024; 0 is one for each core. The result does not depend on it
@@ -108,66 +108,73 @@ struct BuildArgs {
     /// surface, divided where huge), `groups`, or `grid:METRES`
     #[arg(long, value_name = "MODE", default_value = "auto", help_heading = "Hierarchy")]
     blocks: BlockMode,
-    /// Ratio of triangles and texels between levels, and pieces a node is cut into, 2-64. More:
-    /// fewer levels, coarser steps between them
+    /// The shape of the trees
+    #[arg(long, value_enum, default_value_t = TreeArg::Balanced, help_heading = "Hierarchy")]
+    tree: TreeArg,
+    /// Ratio of triangles and texels between levels, and the number of children of a node, 2-64.
+    /// More: fewer levels, coarser steps between them
     #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Hierarchy")]
     level_factor: u32,
-    /// Triangles wanted in a node, 1 or more. More: fewer, larger files
+    /// Target number of triangles in a node, 1 or more. More: fewer, larger files
     #[arg(long, value_name = "N", default_value_t = 900, help_heading = "Hierarchy")]
     desired_tris: u32,
-    /// How coarse nodes are made
+    /// How coarse nodes are simplified
     #[arg(long, value_enum, default_value_t = SimplifierArg::Qem, help_heading = "Hierarchy")]
     simplifier: SimplifierArg,
-    /// What coarse nodes are made from: `original` is the thesis's way and slower
+    /// What coarse nodes are simplified from: `children`, the level below, or `original`, the source,
+    /// as in Lakhia's thesis; slower
     #[arg(long, value_enum, default_value_t = FromArg::Children, help_heading = "Hierarchy")]
     simplify_from: FromArg,
-    /// What happens to vertices on cutting planes: `skirts` thins them alike on both sides and
-    /// covers the gaps between levels, `shared` leaves those gaps, `locked` keeps every vertex
+    /// How borders on cutting planes are simplified: `skirts` identically on both sides, with strips
+    /// over the gaps between levels; `shared` without the strips; `locked` not at all
     #[arg(long, value_enum, default_value_t = BordersArg::Skirts, help_heading = "Hierarchy")]
     borders: BordersArg,
-    /// What happens to texture seams in coarse nodes: `keep` simplifies around them, `auto` gives
-    /// nodes whose seams are in the way a texture of their own, `bake` all of them
+    /// Texture seams of coarse nodes: `keep` preserves them, `bake` replaces the texture by one baked
+    /// from the source, `auto` bakes where seams prevent simplification
     #[arg(long, value_enum, default_value_t = SeamsArg::Auto, help_heading = "Hierarchy")]
     seams: SeamsArg,
-    /// The axis that points at the sky, where the input does not say [default: looked up in the
-    /// format, else guessed from the shape]
+    /// Up axis, where the input does not say [default: the format's, else guessed from the shape]
     #[arg(long, value_enum, help_heading = "Hierarchy")]
     up: Option<UpArg>,
 
-    /// The coordinate reference system of the coordinates, as EPSG:CODE: projected, in metres or
-    /// feet, or in degrees (longitude, latitude, height in metres), with --origin. Puts tileset.json
-    /// on the globe
-    #[arg(long, value_name = "EPSG:CODE", help_heading = "Place")]
+    /// Coordinate reference system: projected, in metres or feet; or, with --origin, in degrees
+    /// (longitude, latitude, height in metres). Puts tileset.json on the globe
+    #[arg(long, value_name = "EPSG:CODE", help_heading = "Georeferencing")]
     crs: Option<CrsArg>,
-    /// Metres to add to the heights of --crs to make them heights over the ellipsoid: the height
-    /// of the geoid where they are over sea level
+    /// Metres to add to the heights of --crs to make them heights above the ellipsoid: the height
+    /// of the geoid where they are above sea level
     #[arg(
         long,
         value_name = "METRES",
         default_value_t = 0.0,
         requires = "crs",
         allow_negative_numbers = true,
-        help_heading = "Place"
+        help_heading = "Georeferencing"
     )]
     height_offset: f64,
-    /// Longitude and latitude in degrees and height over the ellipsoid of the coordinates' origin,
-    /// where these are metres east, north and up. With --crs of degrees: the place, near the model,
-    /// around which it is built in such metres
-    #[arg(long, value_name = "LON,LAT,HEIGHT", allow_hyphen_values = true, help_heading = "Place")]
+    /// Longitude and latitude in degrees and height above the ellipsoid, in metres, of the
+    /// coordinates' origin, where these are metres east, north and up. With --crs in degrees: a
+    /// point near the model, around which it is built in such metres
+    #[arg(
+        long,
+        value_name = "LON,LAT,HEIGHT",
+        allow_hyphen_values = true,
+        help_heading = "Georeferencing"
+    )]
     origin: Option<OriginArg>,
 
     /// Quality of JPEG textures, 1-100. From 90 on, colour keeps its full resolution
     #[arg(long, value_name = "Q", default_value_t = 85, help_heading = "Textures")]
     jpeg_quality: u8,
-    /// Longest side of a node's atlas in texels, 16-65535
+    /// Longest side of a node's texture atlas in texels, 16-65535
     #[arg(long, value_name = "TEXELS", default_value_t = 4096, help_heading = "Textures")]
     max_atlas: u32,
 
-    /// Round all positions to multiples of a power of two, the largest not above METRES (0.000001 to
-    /// 1000), and store them in 16 bits (KHR_mesh_quantization). Leaves are then the source to half
-    /// a step along each axis, 0.87 steps in all; errors of nodes contain that. 0.01 is a 128th of a
-    /// metre. At least 1000 steps must fit across the city [default: positions as exact as 32-bit
-    /// floats from their block's middle]
+    /// Round all positions to multiples of one step and store them in 16 bits
+    /// (KHR_mesh_quantization). The step is the largest power of two not above METRES (0.000001 to
+    /// 1000): 1/128 m for 0.01. Leaves are then within half a step of the source along each axis;
+    /// stored errors include that. The city must be 1000 steps wide or more [default: 32-bit floats,
+    /// relative to the block's origin]
     #[arg(long, value_name = "METRES", help_heading = "Files")]
     quantize: Option<f64>,
     /// Compress vertices and indices without loss: `meshopt` is EXT_meshopt_compression
@@ -193,12 +200,20 @@ enum CompressArg {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum SeamsArg {
-    /// Simplification works around them
+    /// Preserve seams and source textures
     Keep,
-    /// Given up where they are in the way
+    /// Bake where seams prevent simplification
     Auto,
-    /// Given up in every coarse node
+    /// Bake every coarse node
     Bake,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum TreeArg {
+    /// As deep as the geometry needs, with even ratios and cuts that balance triangles
+    Balanced,
+    /// Lakhia's law: slabs of even width, all branches equally deep
+    Thesis,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -232,6 +247,10 @@ impl BuildArgs {
     fn options(&self) -> BuildOptions {
         BuildOptions {
             hierarchy: HierarchyOptions {
+                tree: match self.tree {
+                    TreeArg::Balanced => TreeShape::Balanced,
+                    TreeArg::Thesis => TreeShape::Thesis,
+                },
                 desired_tris: self.desired_tris,
                 level_factor: self.level_factor,
                 simplify_from: match self.simplify_from {

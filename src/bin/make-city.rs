@@ -7,15 +7,17 @@ use clap::Parser;
 use hlod::city::{self, CityOptions, TextureSize};
 use hlod::{Error, Result};
 
-/// Generate a city of scanned façades: one group for each block (one side of a city block), with
-/// noise, windows, ledges, occlusion holes and one large texture of numbered tiles to a block;
-/// roofs and ground coarser and without texture. Metres, z up.
+/// Generates a city of scanned façades, for tests and benchmarks.
+///
+/// A block is one side of a city block, and one group of the file: a noisy façade with windows,
+/// ledges, occlusion holes and one large texture of numbered tiles, and coarser roofs and ground
+/// without texture. Metres, z up.
 #[derive(Parser)]
 #[command(
     version,
     after_help = "Exit codes: 0 success, 1 internal error, 2 usage, 4 output not written.\n\n\
         Examples:\n  \
-        make-city city.obj\n  \
+        make-city --blocks 25 --triangles 400000 city.obj\n  \
         make-city --blocks 70 --triangles 5600000 --offset 678016,5403456,400 city.obj\n  \
         make-city --blocks 25 --triangles 8950000 --texels-per-triangle 105 city.glb"
 )]
@@ -24,20 +26,20 @@ struct Arguments {
     /// An earlier city there is replaced, missing parent folders are created
     #[arg(value_name = "OUT")]
     out: PathBuf,
-    /// Façade rows, 1 to 100000
+    /// Blocks, 1 to 100000
     #[arg(long, value_name = "N", default_value_t = CityOptions::default().blocks)]
     blocks: usize,
-    /// Triangles of the whole city, met within 1 %: 2000 to 20 million a block
+    /// Triangles of the whole city, met within 1 %; 2000 to 20 million a block
     #[arg(long, value_name = "N", default_value_t = CityOptions::default().triangles)]
     triangles: u64,
     /// Texture size, in texels for each triangle of the block, 0.1 to 10000 [default: 17]
-    #[arg(long, value_name = "X", conflicts_with_all = ["texture_size", "no_textures"])]
+    #[arg(long, value_name = "X", conflicts_with_all = ["texture_size", "no_textures"], help_heading = "Textures")]
     texels_per_triangle: Option<f64>,
     /// Texture size of every block in texels, 16 to 16384 on each side
-    #[arg(long, value_name = "WxH", value_parser = parse_size, conflicts_with = "no_textures")]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, conflicts_with = "no_textures", help_heading = "Textures")]
     texture_size: Option<(u32, u32)>,
     /// No textures and no texture coordinates
-    #[arg(long)]
+    #[arg(long, help_heading = "Textures")]
     no_textures: bool,
     /// World position of the city's corner, metres within ±16000000, rounded to 0.1 mm
     #[arg(
@@ -48,19 +50,19 @@ struct Arguments {
         allow_hyphen_values = true
     )]
     offset: Offset,
-    /// Another number draws another city
+    /// Seed of the random numbers: another seed gives another city
     #[arg(long, value_name = "N", default_value_t = CityOptions::default().seed)]
     seed: u64,
-    /// One closed surface for each block: no holes, façade, roofs and base welded
+    /// One closed surface for each block: no holes; façade, roofs and base welded
     #[arg(long)]
     watertight: bool,
     /// Quality of the JPEG textures, 1 to 100
-    #[arg(long, value_name = "Q", default_value_t = CityOptions::default().jpeg_quality)]
+    #[arg(long, value_name = "Q", default_value_t = CityOptions::default().jpeg_quality, help_heading = "Textures")]
     jpeg_quality: u8,
-    /// A folder with an OBJ, an MTL and a texture for each block, rather than one file
+    /// Write a folder with an OBJ, an MTL and a texture for each block, rather than one file
     #[arg(long)]
     split: bool,
-    /// Threads; the result does not depend on it [default: all cores]
+    /// Threads, 1-1024; the result does not depend on it [default: one for each core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Print nothing but errors

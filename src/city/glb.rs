@@ -39,7 +39,7 @@ const Z_UP_TO_Y_UP: [f64; 16] =
 enum Kind {
     Vectors { components: usize, bounds: Option<[[f32; 3]; 2]> },
     Indices,
-    Picture,
+    Texture,
 }
 
 /// One part of the binary chunk.
@@ -53,7 +53,7 @@ struct Encoded {
     index: usize,
     facade: Vec<Section>,
     rest: Vec<Section>,
-    picture: Option<Section>,
+    texture: Option<Section>,
     facts: BlockFacts,
 }
 
@@ -146,8 +146,8 @@ fn encode(city: &City, index: usize, scan: &Scan, jpeg: Option<Jpeg>) -> Encoded
         })
         .collect();
     let rest_sections = vec![positions(used.iter()), indices(&rest)];
-    let picture = jpeg.map(|jpeg| Section { kind: Kind::Picture, bytes: jpeg.bytes });
-    Encoded { index, facade: facade_sections, rest: rest_sections, picture, facts }
+    let texture = jpeg.map(|jpeg| Section { kind: Kind::Texture, bytes: jpeg.bytes });
+    Encoded { index, facade: facade_sections, rest: rest_sections, texture, facts }
 }
 
 fn positions<'a>(steps: impl ExactSizeIterator<Item = &'a [i32; 3]>) -> Section {
@@ -216,8 +216,8 @@ impl Document {
             "indices": rest.last(),
             "material": 0,
         });
-        let look = if let Some(picture) = block.picture {
-            let view = self.view(&picture, write)?;
+        let look = if let Some(texture) = block.texture {
+            let view = self.view(&texture, write)?;
             let image = json!({ "name": name, "mimeType": "image/jpeg", "bufferView": view });
             self.images.push(image);
             self.is_textured = true;
@@ -259,7 +259,7 @@ impl Document {
         match section.kind {
             Kind::Vectors { .. } => view["target"] = ARRAY_BUFFER.into(),
             Kind::Indices => view["target"] = ELEMENT_ARRAY_BUFFER.into(),
-            Kind::Picture => {}
+            Kind::Texture => {}
         }
         self.bytes += (section.bytes.len() + padding) as u64;
         self.views.push(view);

@@ -7,9 +7,9 @@ pub(super) const HOUSE_DEPTH: f64 = 12.0;
 /// Ground in front of a façade, to the middle of the street, metres.
 pub(super) const HALF_STREET: f64 = 7.0;
 
-/// A block's place in the city.
+/// Where a block is in the city.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Place {
+pub(super) struct BlockPlacement {
     /// Where the block's local origin (left end of the façade, street line, ground) stands, whole
     /// metres from the city's corner.
     pub(super) corner: [i64; 2],
@@ -21,8 +21,8 @@ pub(super) struct Place {
     pub(super) ground_overhang: f64,
 }
 
-/// The places of `blocks` façade rows.
-pub(super) fn places(seed: u64, blocks: usize) -> Vec<Place> {
+/// The placements of `blocks` façade rows.
+pub(super) fn placements(seed: u64, blocks: usize) -> Vec<BlockPlacement> {
     let cells = blocks.div_ceil(4);
     let columns = (1..).find(|n| n * n >= cells).unwrap_or(1);
     let rows = cells.div_ceil(columns);
@@ -51,7 +51,7 @@ pub(super) fn places(seed: u64, blocks: usize) -> Vec<Place> {
                 _ => ([x, y + height - depth], height - 2 * depth),
             };
             let is_long = index % 2 == 0;
-            Place {
+            BlockPlacement {
                 corner,
                 turns: (index % 4) as u8,
                 length: length as f64,
@@ -77,17 +77,17 @@ mod tests {
 
     #[test]
     fn rows_have_the_promised_length_and_do_not_overlap() {
-        let places = places(5, 70);
-        assert_eq!(places.len(), 70);
+        let placements = placements(5, 70);
+        assert_eq!(placements.len(), 70);
         // Footprints as integer boxes: corner, corner + turned (length, depth).
-        let boxes: Vec<[[i64; 2]; 2]> = places
+        let boxes: Vec<[[i64; 2]; 2]> = placements
             .iter()
-            .map(|place| {
-                assert!((60.0..=120.0).contains(&place.length), "{}", place.length);
-                let far = turn(place.turns, [place.length as i64, HOUSE_DEPTH as i64]);
-                let end = [place.corner[0] + far[0], place.corner[1] + far[1]];
+            .map(|placement| {
+                assert!((60.0..=120.0).contains(&placement.length), "{}", placement.length);
+                let far = turn(placement.turns, [placement.length as i64, HOUSE_DEPTH as i64]);
+                let end = [placement.corner[0] + far[0], placement.corner[1] + far[1]];
                 [0, 1].map(|axis| {
-                    let (a, b) = (place.corner[axis], end[axis]);
+                    let (a, b) = (placement.corner[axis], end[axis]);
                     [a.min(b), a.max(b)]
                 })
             })

@@ -34,7 +34,7 @@ use image::RgbImage;
 
 use crate::{Error, Result};
 use facade::Facade;
-use layout::Place;
+use layout::BlockPlacement;
 use sampling::Sampling;
 use scan::{STEPS_PER_METRE, Scan};
 
@@ -47,7 +47,7 @@ pub use tiles::{TileCode, TileGrid, TileSample};
 ///
 /// `out` ends in `.obj` or `.glb`; with [`CityOptions::split`] it is a folder instead. Missing
 /// parent folders are created. An OBJ comes with an `.mtl` beside it and its textures in a folder
-/// `<name>_textures`. All is written beside its place and renamed at the end; an earlier city
+/// `<name>_textures`. All is written beside its target and renamed at the end; an earlier city
 /// there is replaced, a folder that holds anything else is refused. Work runs on the current rayon
 /// pool; the bytes do not depend on the number of threads.
 pub fn write(options: &CityOptions, out: &Path) -> Result<CitySummary> {
@@ -86,7 +86,7 @@ pub struct City {
 /// What one block will be.
 #[derive(Clone, Debug)]
 struct Plan {
-    place: Place,
+    placement: BlockPlacement,
     facade: Facade,
     triangles: u64,
     seed: u64,
@@ -96,13 +96,13 @@ impl City {
     /// Lays out a city; refuses options that are out of range.
     pub fn new(options: &CityOptions) -> Result<Self> {
         options.validate()?;
-        let mut plans: Vec<Plan> = layout::places(options.seed, options.blocks)
+        let mut plans: Vec<Plan> = layout::placements(options.seed, options.blocks)
             .into_iter()
             .zip(0..)
-            .map(|(place, index)| {
+            .map(|(placement, index)| {
                 let seed = crate::random::hash(options.seed, index, 0xb10c);
-                let facade = Facade::draw(seed, place.length);
-                Plan { place, facade, triangles: 0, seed }
+                let facade = Facade::draw(seed, placement.length);
+                Plan { placement, facade, triangles: 0, seed }
             })
             .collect();
         // Triangles go by façade area, so that the sample spacing is the same everywhere. The
@@ -154,7 +154,7 @@ impl City {
     }
 
     /// The tile that a block's texture shows at a texture coordinate (v grows downwards) and how
-    /// clear of edges the place is. `None` outside 0–1, past the last block, or without textures.
+    /// clear of edges the position is. `None` outside 0–1, past the last block, or without textures.
     /// The colour there is [`TileCode::new`]`(index).color(tile)`, within the code's tolerance.
     pub fn tile_at(&self, index: usize, texcoord: [f64; 2]) -> Option<TileSample> {
         self.tiles(index)?.at(texcoord)
@@ -170,13 +170,13 @@ impl City {
     }
 
     fn sampling(&self, plan: &Plan) -> Sampling {
-        let overhang = plan.place.ground_overhang;
+        let overhang = plan.placement.ground_overhang;
         Sampling::new(&plan.facade, overhang, self.options.watertight, plan.triangles)
     }
 
     /// A block's mesh, its steps counted from [`City::origin`].
     fn scan(&self, plan: &Plan) -> Scan {
-        let mut scan = scan::scan(&plan.facade, &plan.place, &self.sampling(plan), plan.seed);
+        let mut scan = scan::scan(&plan.facade, &plan.placement, &self.sampling(plan), plan.seed);
         let rest = self.world_steps(plan).map(|steps| steps.rem_euclid(STEPS_PER_METRE as i64));
         if rest != [0; 3] {
             for position in &mut scan.positions {
@@ -192,7 +192,7 @@ impl City {
     }
 
     fn world_steps(&self, plan: &Plan) -> [i64; 3] {
-        let [x, y] = plan.place.corner;
+        let [x, y] = plan.placement.corner;
         let offset = self.options.offset.map(|metres| (metres * STEPS_PER_METRE).round() as i64);
         std::array::from_fn(|axis| offset[axis] + [x, y, 0][axis] * STEPS_PER_METRE as i64)
     }

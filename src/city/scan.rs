@@ -3,7 +3,7 @@
 use super::facade::{Facade, House};
 use super::grid::{Corner, Grid};
 use super::holes::Holes;
-use super::layout::{HALF_STREET, HOUSE_DEPTH, Place, turn};
+use super::layout::{BlockPlacement, HALF_STREET, HOUSE_DEPTH, turn};
 use super::sampling::Sampling;
 use crate::random::{hash, mix};
 
@@ -43,7 +43,12 @@ pub(super) struct Scan {
 }
 
 /// Samples a block.
-pub(super) fn scan(facade: &Facade, place: &Place, sampling: &Sampling, seed: u64) -> Scan {
+pub(super) fn scan(
+    facade: &Facade,
+    placement: &BlockPlacement,
+    sampling: &Sampling,
+    seed: u64,
+) -> Scan {
     let mut scanner = Scanner {
         facade,
         grid: &sampling.grid,
@@ -60,11 +65,11 @@ pub(super) fn scan(facade: &Facade, place: &Place, sampling: &Sampling, seed: u6
     let vertices = scanner.front(sampling.holes);
     scanner.shell(sampling, &vertices);
     if let Some(cells) = sampling.ground {
-        scanner.ground(place.ground_overhang, cells);
+        scanner.ground(placement.ground_overhang, cells);
     }
     let mut scan = scanner.scan;
     for [x, y, _] in &mut scan.positions {
-        [*x, *y] = turn(place.turns, [*x, *y]);
+        [*x, *y] = turn(placement.turns, [*x, *y]);
     }
     scan
 }

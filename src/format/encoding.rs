@@ -22,18 +22,20 @@ impl Encoding {
             let NodeMesh { images, primitives, .. } = mesh;
             primitives.iter_mut().for_each(|primitive| round_texcoords(primitive, images));
         }
-        if self.compress {
-            mesh.primitives.iter_mut().for_each(order);
-        }
+        mesh.primitives.iter_mut().for_each(order);
     }
 }
 
-/// Triangles near each other in space follow each other, and vertices follow triangles: what
-/// resembles its neighbour takes few bits.
+/// Triangles near each other in space follow each other, and vertices follow triangles: a graphics
+/// card transforms and fetches few vertices twice, and what resembles its neighbour takes few bits.
+/// Skirts stay behind all other triangles.
 fn order(primitive: &mut Primitive) {
-    let Primitive { positions, texcoords, colors, indices, .. } = primitive;
+    let Primitive { positions, texcoords, colors, indices, skirt_triangles, .. } = primitive;
     let vertices = positions.len();
-    *indices = meshopt::optimize_vertex_cache(indices, vertices);
+    let (surface, skirts) = indices.split_at(indices.len() - 3 * *skirt_triangles);
+    let mut ordered = meshopt::optimize_vertex_cache(surface, vertices);
+    ordered.extend(meshopt::optimize_vertex_cache(skirts, vertices));
+    *indices = ordered;
     let remap = meshopt::optimize_vertex_fetch_remap(indices, vertices);
     let kept = remap.iter().filter(|&&to| to != u32::MAX).count();
     fn moved<T: Copy + Default>(from: &[T], remap: &[u32], kept: usize) -> Vec<T> {

@@ -178,7 +178,7 @@ struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     fn primitive(&mut self, primitive: &schema::Primitive) -> Parsed<Primitive> {
-        let schema::Primitive { attributes, indices, material } = primitive;
+        let schema::Primitive { attributes, indices, material, extras } = primitive;
         let positions = self.positions(attributes.position)?;
         finite("positions", positions.as_flattened())?;
         let texcoords: Vec<[f32; 2]> = match attributes.texcoord {
@@ -200,11 +200,16 @@ impl<'a> Reader<'a> {
             }
         }
         let indices = self.indices(*indices, vertices)?;
+        let skirt_triangles = extras.as_ref().map_or(0, |extras| extras.skirt_triangles);
+        if skirt_triangles > indices.len() / 3 {
+            let triangles = indices.len() / 3;
+            return Err(format!("expected at most {triangles} skirts, found {skirt_triangles}"));
+        }
         let surface = self.surface(*material)?;
         if surface.image.is_some() && texcoords.is_empty() {
             return Err("expected texture coordinates, found none".into());
         }
-        Ok(Primitive { positions, texcoords, colors, indices, surface })
+        Ok(Primitive { positions, texcoords, colors, indices, skirt_triangles, surface })
     }
 
     /// Metres, or steps that a fourth number fills up to 8 bytes.

@@ -112,6 +112,15 @@ pub(super) struct Primitive {
     pub attributes: Attributes,
     pub indices: usize,
     pub material: usize,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub extras: Option<PrimitiveExtras>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub(super) struct PrimitiveExtras {
+    /// The last so many triangles are skirts.
+    pub skirt_triangles: usize,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -140,10 +140,14 @@ fn placement(
 
 /// What glTF and [`NodeMesh`] demand of a primitive.
 fn check(primitive: &Primitive, images: usize) -> Result<(), String> {
-    let Primitive { positions, texcoords, colors, indices, surface } = primitive;
+    let Primitive { positions, texcoords, colors, indices, skirt_triangles, surface } = primitive;
     let vertices = positions.len();
     if vertices == 0 || indices.is_empty() || !indices.len().is_multiple_of(3) {
         return Err(format!("expected whole triangles, found {} corners", indices.len()));
+    }
+    if *skirt_triangles > indices.len() / 3 {
+        let triangles = indices.len() / 3;
+        return Err(format!("expected at most {triangles} skirts, found {skirt_triangles}"));
     }
     for (name, length) in [("texture coordinates", texcoords.len()), ("colours", colors.len())] {
         if length != 0 && length != vertices {
@@ -187,7 +191,8 @@ struct Writer {
 
 impl Writer {
     fn primitive(&mut self, primitive: &Primitive) -> schema::Primitive {
-        let Primitive { positions, texcoords, colors, indices, surface } = primitive;
+        let Primitive { positions, texcoords, colors, indices, skirt_triangles, surface } =
+            primitive;
         let vertices = positions.len();
         let position = self.positions(positions);
         let texcoord = (!texcoords.is_empty()).then(|| self.texcoords(texcoords));
@@ -215,10 +220,13 @@ impl Writer {
             })
         };
         let material = self.material(surface);
+        let extras = (*skirt_triangles > 0)
+            .then_some(schema::PrimitiveExtras { skirt_triangles: *skirt_triangles });
         schema::Primitive {
             attributes: Attributes { position, texcoord, color },
             indices,
             material,
+            extras,
         }
     }
 

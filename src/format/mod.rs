@@ -4,11 +4,12 @@
 //! out/scene.hlod      the hierarchy: Scene
 //! out/nodes/*.glb     one file per node: NodeMesh
 //! out/textures/*      repeating pictures that many nodes share
-//! out/tileset.json    the same for viewers that read 3D Tiles; see crate::tileset
+//! out/tileset.json    the same for viewers that read 3D Tiles
 //! out/tilesets/*      regions of it, where the city is large
 //! out/build.json      what the build did, for people and scripts
 //! ```
 
+pub mod attributes;
 mod bytes;
 mod encoding;
 mod file_name;
@@ -44,6 +45,10 @@ pub use quantized::fits_in_steps;
 pub use scene::{BlockInfo, Children, Node, Scene, SharedTexture};
 pub use scene_check::{Element, SceneDefect};
 
+/// The 3D Tiles tileset that a viewer opens, inside an output folder.
+pub const TILESET_FILE: &str = "tileset.json";
+/// The folder of tilesets of regions inside an output folder.
+pub const TILESETS_DIR: &str = "tilesets";
 /// The scene description inside an output folder.
 pub const SCENE_FILE: &str = "scene.hlod";
 /// The folder of node files inside an output folder.
@@ -57,7 +62,7 @@ pub const REPORT_FILE: &str = "build.json";
 /// take it for text.
 pub const SCENE_MAGIC: [u8; 8] = *b"HLODSCN\x1a";
 /// The version of the scene file that this crate writes, and the only one that it reads.
-pub const SCENE_VERSION: u32 = 2;
+pub const SCENE_VERSION: u32 = 3;
 
 /// CRC-32 (ISO-HDLC, as in zip and PNG) of a node's file, as [`Node::file_crc`] keeps it.
 pub fn file_crc(bytes: &[u8]) -> u32 {

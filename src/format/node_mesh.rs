@@ -58,6 +58,9 @@ pub struct Primitive {
     pub colors: Vec<[u16; 4]>,
     /// Three per triangle.
     pub indices: Vec<u32>,
+    /// The last so many triangles are skirts: no part of the surface, but in a cutting plane, where
+    /// they close gaps between levels.
+    pub skirt_triangles: usize,
     /// How they look.
     pub surface: Surface,
 }

@@ -10,8 +10,9 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
-use super::{NODES_DIR, REPORT_FILE, SCENE_FILE, SCENE_MAGIC, TEXTURES_DIR};
-use crate::tileset::{TILESET_FILE, TILESETS_DIR};
+use super::{
+    NODES_DIR, REPORT_FILE, SCENE_FILE, SCENE_MAGIC, TEXTURES_DIR, TILESET_FILE, TILESETS_DIR,
+};
 use crate::{Error, Result};
 
 const PARTIAL: &str = "hlod-partial-";

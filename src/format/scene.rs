@@ -85,6 +85,11 @@ pub struct Node {
     /// Bound on the distance in metres between this node and the source; never less at a parent
     /// than at its children.
     pub geometric_error: f64,
+    /// Mean distance between this node and the source, both ways, metres. Unlike the bound it tells
+    /// a node that lost a chimney from one that is bent all over.
+    pub mean_error: f64,
+    /// The distance that 95 of 100 points are within, both ways, metres.
+    pub p95_error: f64,
     /// Texels of the node's own pictures.
     pub texels: u64,
     /// Width and height of each of the node's own pictures, in the order of its file, so that

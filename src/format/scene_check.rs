@@ -282,6 +282,8 @@ impl Check<'_> {
         self.number(element, "cost", Range::NotNegative, node.cost);
         self.number(element, "static benefit", Range::NotNegative, node.static_benefit);
         self.number(element, "geometric error", Range::NotNegative, node.geometric_error);
+        self.number(element, "mean error", Range::NotNegative, node.mean_error);
+        self.number(element, "95th percentile of the error", Range::NotNegative, node.p95_error);
         self.number(element, "average normal", Range::Direction, length(node.average_normal));
         for axis in 0..3 {
             let (min, max) = (node.bbox_min[axis], node.bbox_max[axis]);

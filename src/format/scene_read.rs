@@ -204,6 +204,8 @@ fn node(cursor: &mut Cursor<'_>) -> Result<Node, Unreadable> {
         cost: cursor.f64("cost of a node")?,
         static_benefit: cursor.f64("static benefit of a node")?,
         geometric_error: cursor.f64("geometric error of a node")?,
+        mean_error: cursor.f64("mean error of a node")?,
+        p95_error: cursor.f64("95th percentile of the error of a node")?,
         average_normal: [
             cursor.f32("average normal of a node")?,
             cursor.f32("average normal of a node")?,

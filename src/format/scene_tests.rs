@@ -238,6 +238,16 @@ fn every_defect_is_found() {
             |d| matches!(d, D::Number { field: "geometric error", .. }),
         ),
         (
+            "NaN mean error",
+            |s| s.nodes[0].mean_error = f64::NAN,
+            |d| matches!(d, D::Number { field: "mean error", .. }),
+        ),
+        (
+            "negative percentile of the error",
+            |s| s.nodes[0].p95_error = -1.0,
+            |d| matches!(d, D::Number { field: "95th percentile of the error", .. }),
+        ),
+        (
             "negative cost",
             |s| s.nodes[0].cost = -1.0,
             |d| matches!(d, D::Number { field: "cost", found: -1.0, .. }),

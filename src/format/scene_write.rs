@@ -11,7 +11,8 @@
 //! count u32 · blocks: name text · input text · origin [f64; 3]
 //! count u32 · nodes: id u64 · parent, first child, next sibling u32 · level u32 · block u32
 //!             triangles, textured triangles, vertices u32 · bounding box min and max [f64; 6]
-//!             cost, static benefit, geometric error f64 · average normal [f32; 3]
+//!             cost, static benefit f64 · geometric, mean, 95th percentile error f64
+//!             average normal [f32; 3]
 //!             texels, shared texels u64 · origin [f64; 3] · file name text · file bytes u64
 //!             file CRC-32 u32 · count u32 · indices of shared textures u32
 //!             count u32 · own pictures: width u32 · height u32
@@ -120,7 +121,8 @@ impl Sink {
         self.u32(node.vertices);
         self.f64s(&node.bbox_min);
         self.f64s(&node.bbox_max);
-        self.f64s(&[node.cost, node.static_benefit, node.geometric_error]);
+        self.f64s(&[node.cost, node.static_benefit]);
+        self.f64s(&[node.geometric_error, node.mean_error, node.p95_error]);
         node.average_normal.iter().for_each(|value| self.0.extend(value.to_le_bytes()));
         self.u64(node.texels);
         self.u64(node.shared_texels);

@@ -59,6 +59,7 @@ pub(crate) fn mesh() -> NodeMesh {
                 texcoords: texcoords.clone(),
                 colors: vec![],
                 indices: indices.clone(),
+                skirt_triangles: 0,
                 surface: photograph,
             },
             Primitive {
@@ -66,6 +67,7 @@ pub(crate) fn mesh() -> NodeMesh {
                 texcoords,
                 colors: vec![[65535, 0, 1, 65535]; 4],
                 indices: indices.clone(),
+                skirt_triangles: 0,
                 surface: fence,
             },
             Primitive {
@@ -73,6 +75,7 @@ pub(crate) fn mesh() -> NodeMesh {
                 texcoords: vec![],
                 colors: vec![[1, 2, 3, 65535]; 4],
                 indices: indices.clone(),
+                skirt_triangles: 0,
                 surface: plain.clone(),
             },
             Primitive {
@@ -80,6 +83,7 @@ pub(crate) fn mesh() -> NodeMesh {
                 texcoords: vec![],
                 colors: vec![],
                 indices: vec![2, 1, 0],
+                skirt_triangles: 0,
                 surface: plain,
             },
         ],

@@ -21,6 +21,8 @@ pub(crate) fn scene() -> Scene {
         static_benefit: 0.1,
         average_normal: [0.0, 0.6, -0.8],
         geometric_error: error,
+        mean_error: error * 0.25,
+        p95_error: error * 0.5,
         texels: 65_536 + 512,
         pictures: vec![[256, 256], [16, 32]],
         shared_texels: 128,

@@ -6,10 +6,10 @@ use crate::mesh::{Part, Warnings, all_differ};
 
 /// What was removed or ignored in one file, and how often.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Tally {
+pub(super) struct CleanStats {
     /// Triangles with a coordinate that is NaN or infinite.
     pub(super) not_finite: u64,
-    /// Triangles with two corners at the same place.
+    /// Triangles with two corners at the same position.
     pub(super) degenerate: u64,
     /// Triangles with the corners, the winding and the material of an earlier one of their group.
     pub(super) duplicate: u64,
@@ -27,7 +27,7 @@ pub(super) struct Tally {
     pub(super) unused_vertices: u64,
 }
 
-impl Tally {
+impl CleanStats {
     /// Adds what was counted elsewhere.
     pub(super) fn add(&mut self, other: &Self) {
         self.not_finite += other.not_finite;
@@ -60,25 +60,25 @@ impl Tally {
 /// Removes from `part` what is no triangle, and the vertices that nothing uses any more.
 ///
 /// Colours and texture coordinates do not count in what makes two triangles the same.
-pub(super) fn clean(part: &mut Part, tally: &mut Tally) {
+pub(super) fn clean(part: &mut Part, stats: &mut CleanStats) {
     let before = part.indices.len();
-    drop_flat(part, tally);
-    drop_duplicates(part, tally);
+    drop_flat(part, stats);
+    drop_duplicates(part, stats);
     if part.indices.len() < before {
         drop_unused_vertices(part);
     }
 }
 
-fn drop_flat(part: &mut Part, tally: &mut Tally) {
+fn drop_flat(part: &mut Part, stats: &mut CleanStats) {
     let positions = &part.positions;
     retain_triangles(&mut part.indices, |_, [a, b, c]| {
         let corners = [a, b, c].map(|vertex| positions[vertex as usize]);
         if !corners.as_flattened().iter().all(|coordinate| coordinate.is_finite()) {
-            tally.not_finite += 1;
+            stats.not_finite += 1;
             return false;
         }
         if !all_differ(corners) {
-            tally.degenerate += 1;
+            stats.degenerate += 1;
             return false;
         }
         true
@@ -87,7 +87,7 @@ fn drop_flat(part: &mut Part, tally: &mut Tally) {
 
 /// Finds duplicates through a hash of each triangle's three positions that their order does not
 /// change; only triangles of equal hash are compared. Nothing is welded for it.
-fn drop_duplicates(part: &mut Part, tally: &mut Tally) {
+fn drop_duplicates(part: &mut Part, stats: &mut CleanStats) {
     let triangles = part.indices.len() / 3;
     if triangles < 2 || triangles >= u32::MAX as usize {
         return;
@@ -123,7 +123,7 @@ fn drop_duplicates(part: &mut Part, tally: &mut Tally) {
             slot = (slot + 1) & mask;
         };
         if duplicate {
-            tally.duplicate += 1;
+            stats.duplicate += 1;
             continue;
         }
         table[slot] = (mark, kept);
@@ -139,7 +139,7 @@ const EMPTY: u32 = u32::MAX;
 /// Odd, with its bits well spread (the fractional part of the golden ratio).
 const MULTIPLIER: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// A hash of a place; −0 and 0 are the same place.
+/// A hash of a position; −0 and 0 are the same.
 fn position_hash(position: &[f64; 3]) -> u64 {
     position.iter().fold(0_u64, |hash, coordinate| {
         let mixed = (hash ^ (coordinate + 0.0).to_bits()).wrapping_mul(MULTIPLIER);
@@ -224,9 +224,9 @@ mod tests {
     #[test]
     fn what_is_no_triangle_goes_and_vertices_with_it() {
         let mut part = part(&CORNERS, &[[0, 0, 1], [0, 4, 1], [5, 1, 2], [1, 3, 2]]);
-        let mut tally = Tally::default();
-        clean(&mut part, &mut tally);
-        assert_eq!(tally, Tally { degenerate: 2, not_finite: 1, ..Tally::default() });
+        let mut stats = CleanStats::default();
+        clean(&mut part, &mut stats);
+        assert_eq!(stats, CleanStats { degenerate: 2, not_finite: 1, ..CleanStats::default() });
         assert_eq!(part.positions, [CORNERS[1], CORNERS[2], CORNERS[3]]);
         assert_eq!(part.texcoords, [[1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]);
         assert_eq!(part.indices, [0, 2, 1]);
@@ -237,9 +237,9 @@ mod tests {
     fn duplicates_go_in_any_rotation_but_not_mirrored() {
         let triangles = [[0, 1, 2], [1, 2, 0], [2, 1, 0], [4, 1, 2], [1, 3, 2]];
         let mut part = part(&CORNERS[..5], &triangles);
-        let mut tally = Tally::default();
-        clean(&mut part, &mut tally);
-        assert_eq!(tally, Tally { duplicate: 2, ..Tally::default() });
+        let mut stats = CleanStats::default();
+        clean(&mut part, &mut stats);
+        assert_eq!(stats, CleanStats { duplicate: 2, ..CleanStats::default() });
         assert_eq!(part.indices, [0, 1, 2, 2, 1, 0, 1, 3, 2]);
         assert_eq!(part.positions.len(), 4, "the second vertex at the origin is unused now");
     }
@@ -259,12 +259,12 @@ mod tests {
         }
         let once = part(&positions, &triangles);
         let mut cleaned = once.clone();
-        let mut tally = Tally::default();
-        clean(&mut cleaned, &mut tally);
-        assert_eq!((&cleaned, tally), (&once, Tally::default()));
+        let mut stats = CleanStats::default();
+        clean(&mut cleaned, &mut stats);
+        assert_eq!((&cleaned, stats), (&once, CleanStats::default()));
         cleaned.indices.extend(&once.indices);
-        clean(&mut cleaned, &mut tally);
+        clean(&mut cleaned, &mut stats);
         assert_eq!(cleaned, once);
-        assert_eq!(tally.duplicate, triangles.len() as u64);
+        assert_eq!(stats.duplicate, triangles.len() as u64);
     }
 }

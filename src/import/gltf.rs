@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use gltf::json::mesh::{Mode, Primitive, Semantic};
-use gltf::json::validation::Checked;
-use gltf::json::{Index, Root};
+use gltf_json::mesh::{Mode, Primitive, Semantic};
+use gltf_json::validation::Checked;
+use gltf_json::{Index, Root};
 use serde_json::Value;
 
-use super::clean::{Tally, clean};
-use super::color::to_unorm16;
+use super::clean::{CleanStats, clean};
 use super::gltf_buffers::{Buffers, container};
 use super::gltf_materials::{GltfMaterial, Materials, texture_images};
 use super::gltf_nodes::{Instance, instances};
 use super::paths::Finder;
 use super::vertices::NONE;
+use crate::color::unorm16;
 use crate::mesh::{Group, Model, Part, UpAxis, Warnings};
 use crate::{Error, Result};
 
@@ -64,7 +64,7 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Model, String> {
         finder,
         makers: Materials::new(&root, &images, path.display().to_string()),
         warnings,
-        tally: Tally::default(),
+        stats: CleanStats::default(),
         materials: Vec::new(),
         material_of_index: BTreeMap::new(),
         groups: Vec::new(),
@@ -73,10 +73,10 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Model, String> {
     for instance in &placed {
         scene.add(instance).map_err(|what| format!("node {}: {what}", instance.node))?;
     }
-    if scene.parts.is_empty() && scene.tally == Tally::default() {
+    if scene.parts.is_empty() && scene.stats == CleanStats::default() {
         return Err("no triangle in any mesh of its scene; expected at least one".to_owned());
     }
-    scene.tally.report(path, &mut scene.warnings);
+    scene.stats.report(path, &mut scene.warnings);
     dependencies.extend(scene.makers.textures.dependencies());
     dependencies.extend(scene.finder.absent());
     Ok(Model {
@@ -98,7 +98,7 @@ fn check_extensions(path: &Path, json: &Value, warnings: &mut Warnings) -> Resul
     for name in required.iter().filter_map(Value::as_str) {
         if READ_EXTENSIONS.contains(&name) {
         } else if name.starts_with("KHR_materials_") || name == "KHR_lights_punctual" {
-            // Reflections and light: the diffuse picture, all that is kept, is there without.
+            // Reflections and light: the diffuse texture, all that is kept, is there without.
             warnings.add(format!("{}: extension {name}, ignored", path.display()), 1);
         } else {
             refused.push(name);
@@ -139,7 +139,7 @@ struct Scene<'a> {
     finder: Finder,
     makers: Materials<'a>,
     warnings: Warnings,
-    tally: Tally,
+    stats: CleanStats,
     materials: Vec<GltfMaterial>,
     /// By glTF's material, `None` being its default.
     material_of_index: BTreeMap<Option<usize>, u32>,
@@ -176,7 +176,7 @@ impl Scene<'_> {
             }
         }
         for part in &mut parts {
-            clean(part, &mut self.tally);
+            clean(part, &mut self.stats);
         }
         parts.retain(|part| !part.indices.is_empty());
         if !parts.is_empty() {
@@ -216,7 +216,7 @@ impl Scene<'_> {
             return Ok(());
         };
         if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
-            self.tally.not_triangles += 1;
+            self.stats.not_triangles += 1;
             return Ok(());
         }
         let positions: Vec<[f64; 3]> = self.buffers.vectors(position_accessor)?;
@@ -252,7 +252,7 @@ impl Scene<'_> {
         }
         let textured = made.material.texture.is_some();
         if textured && texcoords.is_none() {
-            self.tally.untextured_faces += corners.len() as u64 / 3;
+            self.stats.untextured_faces += corners.len() as u64 / 3;
         }
 
         // Only what the triangles use: primitives often share accessors much larger than they.
@@ -273,14 +273,14 @@ impl Scene<'_> {
             if *slot == NONE {
                 *slot = part.positions.len() as u32;
                 let corner = corner as usize;
-                let place = instance.world.transform_point3(positions[corner].into());
-                part.positions.push(place.to_array());
+                let position = instance.world.transform_point3(positions[corner].into());
+                part.positions.push(position.to_array());
                 if textured {
                     let uv = texcoords
                         .as_ref()
                         .map_or([0.0; 2], |texcoords| made.transform.apply(texcoords[corner]));
                     let finite = uv.iter().all(|value| value.is_finite());
-                    self.tally.texcoords_not_finite += u64::from(!finite);
+                    self.stats.texcoords_not_finite += u64::from(!finite);
                     part.texcoords.push(if finite { uv } else { [0.0; 2] });
                 }
                 if colored {
@@ -293,13 +293,13 @@ impl Scene<'_> {
     }
 
     /// Vertex colours, RGB or RGBA, which glTF gives in linear light.
-    fn colors(&self, accessor: Index<gltf::json::Accessor>) -> Result<Vec<[u16; 4]>, String> {
+    fn colors(&self, accessor: Index<gltf_json::Accessor>) -> Result<Vec<[u16; 4]>, String> {
         if self.buffers.components(accessor)? == 4 {
             let colors = self.buffers.vectors::<4>(accessor)?;
-            return Ok(colors.iter().map(|color| color.map(to_unorm16)).collect());
+            return Ok(colors.iter().map(|color| color.map(unorm16)).collect());
         }
         let colors = self.buffers.vectors::<3>(accessor)?;
-        let opaque = |&[r, g, b]: &[f64; 3]| [r, g, b, 1.0].map(to_unorm16);
+        let opaque = |&[r, g, b]: &[f64; 3]| [r, g, b, 1.0].map(unorm16);
         Ok(colors.iter().map(opaque).collect())
     }
 }

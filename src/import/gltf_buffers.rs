@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
-use gltf::json::validation::{Checked, USize64};
-use gltf::json::{Index, Root, buffer};
+use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
+use gltf_json::validation::{Checked, USize64};
+use gltf_json::{Index, Root, buffer};
 
 use super::paths::Finder;
 
@@ -169,7 +169,7 @@ impl<'a> Buffers<'a> {
     /// The elements of an accessor of `N` components, integers scaled where it is normalised.
     pub(super) fn vectors<const N: usize>(
         &self,
-        index: Index<gltf::json::Accessor>,
+        index: Index<gltf_json::Accessor>,
     ) -> Result<Vec<[f64; N]>, String> {
         let number = index.value();
         let accessor = self.layout(number)?;
@@ -189,12 +189,12 @@ impl<'a> Buffers<'a> {
     }
 
     /// The number of components of an accessor's elements.
-    pub(super) fn components(&self, index: Index<gltf::json::Accessor>) -> Result<usize, String> {
+    pub(super) fn components(&self, index: Index<gltf_json::Accessor>) -> Result<usize, String> {
         Ok(self.layout(index.value())?.components)
     }
 
     /// The elements of an accessor of whole numbers.
-    pub(super) fn indices(&self, index: Index<gltf::json::Accessor>) -> Result<Vec<u32>, String> {
+    pub(super) fn indices(&self, index: Index<gltf_json::Accessor>) -> Result<Vec<u32>, String> {
         let number = index.value();
         let accessor = self.layout(number)?;
         let kind = accessor.component_type;
@@ -252,9 +252,9 @@ impl<'a> Buffers<'a> {
         let values =
             self.strided(number, values.buffer_view, values.byte_offset, count, size, size)?;
         for at in 0..count {
-            let place = unsigned(&places[at * index_size..][..index_size], index_type.0);
-            let slot = out.get_mut(place as usize).ok_or_else(|| {
-                format!("accessor {number}: sparse index {place} of {}", accessor.count)
+            let index = unsigned(&places[at * index_size..][..index_size], index_type.0);
+            let slot = out.get_mut(index as usize).ok_or_else(|| {
+                format!("accessor {number}: sparse index {index} of {}", accessor.count)
             })?;
             *slot = decode(&values[at * size..][..size]);
         }
@@ -318,7 +318,7 @@ impl<'a> Buffers<'a> {
 
 /// What an accessor says of its elements, checked.
 struct Layout<'a> {
-    json: &'a gltf::json::Accessor,
+    json: &'a gltf_json::Accessor,
     component_type: ComponentType,
     components: usize,
     count: usize,

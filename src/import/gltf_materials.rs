@@ -1,10 +1,10 @@
-//! Materials and pictures of glTF.
+//! Materials and textures of glTF.
 
-use gltf::json::extensions::texture::TextureTransform;
-use gltf::json::material as json_material;
-use gltf::json::texture::{Info, WrappingMode};
-use gltf::json::validation::Checked;
-use gltf::json::{Root, image};
+use gltf_json::extensions::texture::TextureTransform;
+use gltf_json::material as json_material;
+use gltf_json::texture::{Info, WrappingMode};
+use gltf_json::validation::Checked;
+use gltf_json::{Root, image};
 use serde_json::Value;
 
 use super::gltf_buffers::{Buffers, find_uri, read_uri};
@@ -12,7 +12,7 @@ use super::paths::Finder;
 use super::textures::Textures;
 use crate::mesh::{AlphaMode, Material, TextureData, TextureSource, Warnings, Wrap};
 
-/// A material, and which texture coordinates its picture takes in what way.
+/// A material, and which texture coordinates its texture takes in what way.
 #[derive(Clone, Debug)]
 pub(super) struct GltfMaterial {
     pub(super) material: Material,

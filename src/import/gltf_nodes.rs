@@ -106,8 +106,8 @@ mod tests {
             found.iter().map(|one| (one.node, one.mesh)).collect::<Vec<_>>(),
             [(2, 3), (0, 0)]
         );
-        let place = found[0].world.transform_point3(DVec3::ZERO);
-        assert_eq!(place, DVec3::new(678_016.123_456_789, 5_403_456.987_654_321, 0.5));
+        let position = found[0].world.transform_point3(DVec3::ZERO);
+        assert_eq!(position, DVec3::new(678_016.123_456_789, 5_403_456.987_654_321, 0.5));
         let turned = found[0].world.transform_vector3(DVec3::X);
         assert!((turned - DVec3::new(0.0, 2.0, 0.0)).length() < 1e-12, "{turned}");
         assert_eq!(found[1].world.transform_point3(DVec3::ZERO), DVec3::new(7.0, 0.0, 0.0));

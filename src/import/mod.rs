@@ -1,4 +1,5 @@
-//! Import: OBJ with MTL, glTF and GLB become [`Model`]s; pictures are found, and decoded on demand.
+//! Import: OBJ with MTL, glTF and GLB become [`Model`]s; textures are found, but not decoded (see
+//! [`decode`](crate::decode)).
 //!
 //! Everything that later steps rely on is settled here: polygons are triangles, texture transforms
 //! are applied, node hierarchies are flattened in f64, coordinates are finite, indices are valid,
@@ -6,7 +7,6 @@
 //! [`Model::warnings`]; what cannot be read at all is an [`Error::Input`].
 
 mod clean;
-mod color;
 mod find;
 mod gltf;
 mod gltf_buffers;
@@ -16,8 +16,6 @@ mod lines;
 mod mtl;
 mod obj;
 mod paths;
-mod picture;
-mod spent;
 mod textures;
 mod tokens;
 mod vertices;
@@ -27,24 +25,23 @@ use std::fs::File;
 use std::path::Path;
 
 pub use find::find_inputs;
-pub use picture::{Picture, decode_texture, texture_size};
-pub use spent::Spent;
 
 use glam::DVec3;
 
+use crate::cpu_time::CpuTime;
 use crate::mesh::{Model, Part};
 use crate::{Error, Result};
 
 /// Reads one model file: OBJ, glTF or GLB, by its extension.
 pub fn load(path: &Path) -> Result<Model> {
-    load_timed(path, &Spent::default())
+    load_timed(path, &CpuTime::default())
 }
 
-/// Reads one model file, and adds the time that the threads at work need for it to `spent`.
-pub fn load_timed(path: &Path, spent: &Spent) -> Result<Model> {
+/// Reads one model file, and adds the time that the threads at work need for it to `cpu_time`.
+pub fn load_timed(path: &Path, cpu_time: &CpuTime) -> Result<Model> {
     match find::kind(path) {
-        Some(find::Kind::Obj) => obj::load(path, spent),
-        Some(find::Kind::Gltf) => spent.time(|| gltf::load(path)),
+        Some(find::Kind::Obj) => obj::load(path, cpu_time),
+        Some(find::Kind::Gltf) => cpu_time.time(|| gltf::load(path)),
         None => {
             Err(Error::input(path, format!("not a model by its extension; {}", find::EXPECTED)))
         }

@@ -1,16 +1,15 @@
 //! MTL: material libraries of OBJ.
 //!
-//! Statements are read by tobj, one material at a time, so that one that cannot be read costs no
-//! other. What tobj leaves as text (texture options) is read here.
+//! Of its statements `Kd`, `d`, `Tr`, `map_Kd` and `map_d` matter here; one that cannot be read
+//! costs no other.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::color::srgb_to_linear;
 use super::lines::{Lines, text};
 use super::paths::Finder;
 use super::textures::Textures;
-use super::tokens::number;
+use crate::color::srgb_to_linear;
 use crate::mesh::{AlphaMode, Material, Warnings, Wrap};
 
 /// Alpha below this is a hole where a material has a `map_d`.
@@ -27,13 +26,13 @@ pub(super) struct MtlMaterial {
 const FAR_OUT: f64 = 256.0;
 
 impl MtlMaterial {
-    /// Grey, without a picture.
+    /// Grey, without a texture.
     pub(super) fn plain(name: &str) -> Self {
         Self { material: Material::plain(name), transform: UvTransform::default() }
     }
 
-    /// How many whole repeats of a picture lie before a texture coordinate that is so far out that
-    /// f32 would lose part of it: the picture is the same without them. Even, so that one that is
+    /// How many whole repeats of a texture lie before a texture coordinate that is so far out that
+    /// f32 would lose part of it: the texture is the same without them. Even, so that one that is
     /// mirrored is too.
     pub(super) fn whole_repeats(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let exact = |axis: usize, at: f64| {
@@ -60,7 +59,7 @@ impl Default for UvTransform {
 }
 
 impl UvTransform {
-    /// The texture coordinate, v downwards, `back` repeats of the picture further back.
+    /// The texture coordinate, v downwards, `back` repeats of the texture further back.
     pub(super) fn apply(&self, [u, v]: [f64; 2], back: [f64; 2]) -> [f32; 2] {
         let u = u * self.scale[0] + self.offset[0];
         let v = v * self.scale[1] + self.offset[1];
@@ -68,32 +67,67 @@ impl UvTransform {
     }
 }
 
-/// A library's statements, by material; materials are made of them when a face uses them, so that
-/// what no face uses costs nothing and warns of nothing.
+/// What a library says of its materials; they are made when a face uses them, so that what no face
+/// uses costs nothing and warns of nothing.
 #[derive(Default)]
 pub(super) struct Library {
-    /// The statements of each material, `newmtl` included. The last definition of a name counts.
-    statements: BTreeMap<String, Vec<u8>>,
+    /// The last definition of a name counts.
+    materials: BTreeMap<String, Statements>,
+}
+
+/// The statements of a material, each the last of its kind.
+#[derive(Debug, Default)]
+struct Statements {
+    /// `Kd`, sRGB.
+    diffuse: Option<[f64; 3]>,
+    /// `d`.
+    dissolve: Option<f64>,
+    /// `Tr`, which is 1 − `d`.
+    transparency: Option<f64>,
+    /// `map_Kd`.
+    diffuse_map: Option<TextureStatement>,
+    /// `map_d`.
+    opacity_map: Option<TextureStatement>,
+}
+
+impl Statements {
+    /// Takes a statement in; one that does not matter or cannot be read changes nothing.
+    fn add(&mut self, keyword: &str, rest: &str) {
+        let mut numbers = rest.split_whitespace().map_while(|word| word.parse::<f64>().ok());
+        let map = || (!rest.is_empty()).then(|| TextureStatement::parse(rest));
+        match keyword {
+            "Kd" => {
+                if let (Some(r), Some(g), Some(b)) =
+                    (numbers.next(), numbers.next(), numbers.next())
+                {
+                    self.diffuse = Some([r, g, b]);
+                }
+            }
+            "d" => self.dissolve = numbers.next().or(self.dissolve),
+            "Tr" => self.transparency = numbers.next().or(self.transparency),
+            "map_Kd" => self.diffuse_map = map().or_else(|| self.diffuse_map.take()),
+            "map_d" => self.opacity_map = map().or_else(|| self.opacity_map.take()),
+            _ => {}
+        }
+    }
 }
 
 impl Library {
     /// Adds the materials of a library file's bytes.
     pub(super) fn add(&mut self, bytes: &[u8]) {
         let mut lines = Lines::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
-        let mut current: Option<&mut Vec<u8>> = None;
+        let mut current: Option<&mut Statements> = None;
         while let Ok(Some((_, line))) = lines.next() {
             let line = text(line);
             let line = line.trim();
             let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+            let rest = rest.trim();
             if keyword == "newmtl" {
-                let entry = self.statements.entry(rest.trim().to_owned()).or_default();
-                entry.clear();
+                let entry = self.materials.entry(rest.to_owned()).or_default();
+                *entry = Statements::default();
                 current = Some(entry);
-            }
-            if let Some(statements) = &mut current
-                && is_readable(keyword, rest)
-            {
-                statements.extend(format!("{keyword} {}\n", rest.trim()).bytes());
+            } else if let Some(statements) = &mut current {
+                statements.add(keyword, rest);
             }
         }
     }
@@ -107,22 +141,13 @@ impl Library {
         textures: &mut Textures,
         warnings: &mut Warnings,
     ) -> Option<MtlMaterial> {
-        let statements = self.statements.get(name)?;
+        let source = self.materials.get(name)?;
         let mut warn =
             |what: String| warnings.add(format!("{}: material {name}: {what}", model.display()), 1);
-        let source = match tobj::load_mtl_buf(&mut statements.as_slice()) {
-            Ok((materials, _)) => materials.into_iter().next_back(),
-            Err(error) => {
-                warn(format!("not understood ({error}), taken as plain grey"));
-                None
-            }
-        };
-        let Some(source) = source else { return Some(MtlMaterial::plain(name)) };
-
         let mut result = MtlMaterial::plain(name);
         let material = &mut result.material;
-        let opacity_map = source.dissolve_texture.as_deref().map(TextureStatement::parse);
-        if let Some(statement) = source.diffuse_texture.as_deref().map(TextureStatement::parse) {
+        let opacity_map = source.opacity_map.as_ref();
+        if let Some(statement) = &source.diffuse_map {
             let mut find = |wanted: &str| {
                 let found = finder.find(wanted);
                 if found.is_none() {
@@ -131,7 +156,7 @@ impl Library {
                 found
             };
             if let Some(file) = find(&statement.file) {
-                let mask = opacity_map.as_ref().and_then(|statement| find(&statement.file));
+                let mask = opacity_map.and_then(|statement| find(&statement.file));
                 if mask.is_some() {
                     material.alpha = AlphaMode::Mask { cutoff: CUTOFF };
                 }
@@ -153,11 +178,10 @@ impl Library {
             }
             Some(color) if color.iter().all(|part| part.is_finite()) => set_color(material, color),
             Some(_) => warn("Kd is not finite, ignored".into()),
-            None if textured || source.diffuse_texture.is_some() => set_color(material, [1.0; 3]),
+            None if textured || source.diffuse_map.is_some() => set_color(material, [1.0; 3]),
             None => {}
         }
-        let transparency = source.unknown_param.get("Tr").and_then(|text| number(text.as_bytes()));
-        let dissolve = source.dissolve.or(transparency.map(|value| 1.0 - value));
+        let dissolve = source.dissolve.or(source.transparency.map(|value| 1.0 - value));
         match dissolve.filter(|value| value.is_finite()) {
             Some(value) if value <= 0.0 => {
                 warn("d 0 (or Tr 1) would be invisible, taken as opaque".into());
@@ -177,18 +201,6 @@ impl Library {
 fn set_color(material: &mut Material, color: [f64; 3]) {
     for (to, from) in material.base_color.iter_mut().zip(color) {
         *to = srgb_to_linear(from) as f32;
-    }
-}
-
-/// True for statements that matter here and that tobj can read. tobj panics at a colour of fewer
-/// than three components, and one number that it cannot read costs the whole material.
-fn is_readable(keyword: &str, rest: &str) -> bool {
-    let numbers = || rest.split_whitespace().map_while(|word| word.parse::<f64>().ok()).count();
-    match keyword {
-        "newmtl" | "map_Kd" | "map_d" => !rest.trim().is_empty(),
-        "Kd" => numbers() >= 3,
-        "d" | "Tr" => numbers() >= 1,
-        _ => false,
     }
 }
 

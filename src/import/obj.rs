@@ -7,10 +7,9 @@
 //! model does not depend on where chunks end. Memory holds the result, the file's vertices, and
 //! two batches.
 //!
-//! tobj, which reads the materials, is not used for the geometry: it keeps about 100 bytes for
-//! each face of an object until the object ends and hashes each corner, makes triangles of
-//! polylines, gives faces without texture coordinates those of the face before, and cannot say in
-//! which line an error is.
+//! tobj is not used: it keeps about 100 bytes for each face of an object until the object ends and
+//! hashes each corner, makes triangles of polylines, gives faces without texture coordinates those
+//! of the face before, and cannot say in which line an error is.
 
 mod chunks;
 mod corners;
@@ -26,13 +25,13 @@ use rustc_hash::FxHashMap;
 use self::chunks::Chunks;
 use self::corners::{Run, Triangles};
 use self::statements::{Change, Statements, WHITE, first_missing};
-use super::Spent;
-use super::clean::{Tally, clean};
+use super::clean::{CleanStats, clean};
 use super::lines::not_text;
 use super::mtl::{Library, MtlMaterial, UvTransform};
 use super::paths::Finder;
 use super::textures::Textures;
 use super::vertices::Unifier;
+use crate::cpu_time::CpuTime;
 use crate::mesh::{Group, Model, Part, Warnings};
 use crate::{Error, Result};
 
@@ -49,8 +48,8 @@ const CHUNKS_PER_THREAD: usize = 4;
 const MOST_VERTICES: usize = u32::MAX as usize - 64;
 
 /// Reads the OBJ at `path` with its material libraries.
-pub(super) fn load(path: &Path, spent: &Spent) -> Result<Model> {
-    read(path, super::open(path)?, CHUNK_BYTES, spent)
+pub(super) fn load(path: &Path, cpu_time: &CpuTime) -> Result<Model> {
+    read(path, super::open(path)?, CHUNK_BYTES, cpu_time)
 }
 
 /// Reads an OBJ from `reader`; what it names is looked for beside `path`.
@@ -58,7 +57,7 @@ fn read(
     path: &Path,
     mut reader: impl Read + Send,
     chunk_bytes: usize,
-    spent: &Spent,
+    cpu_time: &CpuTime,
 ) -> Result<Model> {
     let unreadable = |error| Error::input(path, format!("cannot be read: {error}"));
     let mut head = Vec::new();
@@ -74,15 +73,15 @@ fn read(
     }
     let mut chunks = Chunks::new(head, reader, chunk_bytes);
     let mut obj = Obj::new(path);
-    let mut batch = Batch::parse(&mut chunks, spent);
+    let mut batch = Batch::parse(&mut chunks, cpu_time);
     loop {
         let Batch { parsed, ended } = batch;
         if parsed.is_empty() {
             ended.map_err(unreadable)?;
-            return obj.finish(spent);
+            return obj.finish(cpu_time);
         }
         let (added, next) =
-            rayon::join(|| obj.add(parsed, spent), || Batch::parse(&mut chunks, spent));
+            rayon::join(|| obj.add(parsed, cpu_time), || Batch::parse(&mut chunks, cpu_time));
         added.map_err(|what| Error::input(path, what))?;
         batch = next;
         if batch.parsed.is_empty() && ended.is_err() {
@@ -106,9 +105,9 @@ struct Batch {
 }
 
 impl Batch {
-    fn parse(chunks: &mut Chunks<impl Read>, spent: &Spent) -> Self {
+    fn parse(chunks: &mut Chunks<impl Read>, cpu_time: &CpuTime) -> Self {
         let mut texts = Vec::new();
-        let ended = spent.time(|| {
+        let ended = cpu_time.time(|| {
             while texts.len() < CHUNKS_PER_THREAD * rayon::current_num_threads() {
                 match chunks.next()? {
                     Some(text) => texts.push(text),
@@ -118,7 +117,7 @@ impl Batch {
             Ok(())
         });
         let parse =
-            |text: Vec<u8>| spent.time(|| Parsed { statements: Statements::of(&text), text });
+            |text: Vec<u8>| cpu_time.time(|| Parsed { statements: Statements::of(&text), text });
         Self { parsed: texts.into_par_iter().map(parse).collect(), ended }
     }
 }
@@ -146,7 +145,7 @@ struct Obj<'a> {
     finder: Finder,
     dependencies: Vec<PathBuf>,
     warnings: Warnings,
-    tally: Tally,
+    stats: CleanStats,
 
     library: Library,
     libraries_read: usize,
@@ -191,7 +190,7 @@ impl<'a> Obj<'a> {
             finder: Finder::new(path),
             dependencies: vec![path.to_path_buf()],
             warnings: Warnings::default(),
-            tally: Tally::default(),
+            stats: CleanStats::default(),
             library: Library::default(),
             libraries_read: 0,
             textures: Textures::default(),
@@ -213,18 +212,18 @@ impl<'a> Obj<'a> {
     }
 
     /// Adds the chunks that come next.
-    fn add(&mut self, parsed: Vec<Parsed>, spent: &Spent) -> Result<(), String> {
-        let placed: Vec<Placed> = spent
+    fn add(&mut self, parsed: Vec<Parsed>, cpu_time: &CpuTime) -> Result<(), String> {
+        let placed: Vec<Placed> = cpu_time
             .time(|| parsed.into_iter().map(|chunk| self.place(chunk)).collect::<Result<_, _>>())?;
         let positions = &self.positions;
         let triangles: Vec<Triangles> = placed
             .par_iter()
             .map(|Placed { statements, runs, before }| {
-                spent.time(|| Triangles::of(statements, runs, *before, positions))
+                cpu_time.time(|| Triangles::of(statements, runs, *before, positions))
             })
             .collect();
         drop(placed);
-        spent.time(|| {
+        cpu_time.time(|| {
             self.unifier.grow(self.positions.len());
             triangles.into_iter().try_for_each(|chunk| self.join(chunk))
         })
@@ -247,7 +246,7 @@ impl<'a> Obj<'a> {
             return Err(format!("more than {MOST_VERTICES} vertices; divide the file"));
         }
         self.lines += chunk.lines;
-        self.tally.add(&chunk.tally);
+        self.stats.add(&chunk.stats);
         if !(self.colors.is_empty() && chunk.colors.is_empty()) {
             self.colors.resize(before[0], WHITE);
             self.colors.append(&mut chunk.colors);
@@ -291,7 +290,7 @@ impl<'a> Obj<'a> {
         if self.unifier.len() + chunk.vertices.len() >= MOST_VERTICES {
             return Err(format!("more than {MOST_VERTICES} distinct vertices; divide the file"));
         }
-        self.tally.add(&chunk.tally);
+        self.stats.add(&chunk.stats);
         let mut vertices = Vec::with_capacity(chunk.vertices.len());
         for pair in chunk.vertices {
             let vertex = self.unifier.vertex(pair, || {
@@ -465,10 +464,10 @@ impl<'a> Obj<'a> {
         }
     }
 
-    fn finish(mut self, spent: &Spent) -> Result<Model> {
+    fn finish(mut self, cpu_time: &CpuTime) -> Result<Model> {
         let line_count = self.lines;
         if self.parts.is_empty() {
-            let what = match (self.positions.len(), self.tally.not_triangles) {
+            let what = match (self.positions.len(), self.stats.not_triangles) {
                 (0, 0) => {
                     format!("no vertex and no face in {line_count} lines; expected a Wavefront OBJ")
                 }
@@ -480,7 +479,7 @@ impl<'a> Obj<'a> {
             return Err(Error::input(self.path, what));
         }
         self.resolve_materials();
-        self.tally.unused_vertices = self.unifier.unused(self.positions.len());
+        self.stats.unused_vertices = self.unifier.unused(self.positions.len());
         let white = self.colors.iter().all(|color| *color == WHITE);
         // The arrays by position are as large as the result; they go before anything else comes.
         self.positions = Vec::new();
@@ -488,18 +487,18 @@ impl<'a> Obj<'a> {
         self.texcoords = Vec::new();
         self.unifier = Unifier::default();
 
-        let parts: Vec<(Part, Tally)> = std::mem::take(&mut self.parts)
+        let parts: Vec<(Part, CleanStats)> = std::mem::take(&mut self.parts)
             .into_par_iter()
-            .map(|state| spent.time(|| finished(state, white)))
+            .map(|state| cpu_time.time(|| finished(state, white)))
             .collect();
         let mut kept = Vec::with_capacity(parts.len());
-        for (part, tally) in parts {
-            self.tally.add(&tally);
+        for (part, stats) in parts {
+            self.stats.add(&stats);
             if !part.indices.is_empty() {
                 kept.push(part);
             }
         }
-        self.tally.report(self.path, &mut self.warnings);
+        self.stats.report(self.path, &mut self.warnings);
         self.dependencies.extend(self.textures.dependencies());
         self.dependencies.extend(self.finder.absent());
         super::assemble(Model {
@@ -516,8 +515,8 @@ impl<'a> Obj<'a> {
 }
 
 /// A part as it will stay, and what was left out. `white` is true where no vertex has a colour.
-fn finished(PartState { mut part, bare_faces, .. }: PartState, white: bool) -> (Part, Tally) {
-    let mut tally = Tally { untextured_faces: bare_faces, ..Tally::default() };
+fn finished(PartState { mut part, bare_faces, .. }: PartState, white: bool) -> (Part, CleanStats) {
+    let mut stats = CleanStats { untextured_faces: bare_faces, ..CleanStats::default() };
     // A part may have begun before the first coloured vertex of the file.
     if white {
         part.colors = Vec::new();
@@ -525,12 +524,12 @@ fn finished(PartState { mut part, bare_faces, .. }: PartState, white: bool) -> (
         let missing = part.positions.len() - part.colors.len();
         part.colors.splice(0..0, std::iter::repeat_n(WHITE, missing));
     }
-    clean(&mut part, &mut tally);
+    clean(&mut part, &mut stats);
     part.positions.shrink_to_fit();
     part.texcoords.shrink_to_fit();
     part.colors.shrink_to_fit();
     part.indices.shrink_to_fit();
-    (part, tally)
+    (part, stats)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Folders beside the model in which exporters put pictures.
+/// Folders beside the model in which exporters put textures.
 const USUAL_FOLDERS: [&str; 5] = ["textures", "texture", "tex", "images", "maps"];
 
 /// Looks up file names on behalf of one model.
@@ -25,7 +25,7 @@ impl Finder {
 
     /// The file that `name` means: as written (relative to the model's folder); with backslashes
     /// as slashes; the end of the path below the model's folder, longest first; and the base name
-    /// in that folder or one for pictures beside the model, in whatever case of letters.
+    /// in that folder or one for textures beside the model, in whatever case of letters.
     pub(super) fn find(&mut self, name: &str) -> Option<PathBuf> {
         let name = name.trim().trim_matches('"');
         if name.is_empty() || name.contains('\0') {

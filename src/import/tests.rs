@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::*;
+use crate::decode::{decode_texture, texture_size};
 use crate::mesh::{AlphaMode, Part};
 
 /// What every imported model promises.
@@ -95,7 +96,7 @@ fn broken_real_data_is_read_and_its_defects_are_counted() {
 }
 
 #[test]
-fn real_cut_outs_and_pictures_are_found() {
+fn real_cut_outs_and_textures_are_found() {
     let Some(data) = data() else { return };
     let model = load(&data.join("torcs_street1/street1.obj")).unwrap();
     assert!(model.warnings.is_empty(), "{:?}", model.warnings);
@@ -104,8 +105,8 @@ fn real_cut_outs_and_pictures_are_found() {
     let masked = model.materials.iter().filter(|material| material.alpha != AlphaMode::Opaque);
     assert_eq!(masked.count(), 13);
     for texture in &model.textures {
-        let picture = decode_texture(texture).unwrap();
-        assert_eq!(texture_size(texture).unwrap(), (picture.width, picture.height));
+        let decoded = decode_texture(texture).unwrap();
+        assert_eq!(texture_size(texture).unwrap(), (decoded.width, decoded.height));
     }
 }
 
@@ -115,9 +116,9 @@ fn a_glb_stands_where_its_obj_does() {
     let bounds = |file: &str| {
         let model = load(&data.join(file)).unwrap();
         let positions = model.parts.iter().flat_map(|part| &part.positions);
-        positions.fold([[f64::MAX; 3], [f64::MIN; 3]], |[low, high], place| {
+        positions.fold([[f64::MAX; 3], [f64::MIN; 3]], |[low, high], position| {
             let each =
-                |f: fn(f64, f64) -> f64, a: [f64; 3]| [0, 1, 2].map(|at| f(a[at], place[at]));
+                |f: fn(f64, f64) -> f64, a: [f64; 3]| [0, 1, 2].map(|at| f(a[at], position[at]));
             [each(f64::min, low), each(f64::max, high)]
         })
     };
@@ -130,7 +131,7 @@ fn a_glb_stands_where_its_obj_does() {
     }
 }
 
-/// The fixture that is in both formats: a shed with a concave floor, a picture whose path comes
+/// The fixture that is in both formats: a shed with a concave floor, a texture whose path comes
 /// from another machine, and a lawn.
 #[test]
 fn the_same_scene_as_obj_and_as_gltf() {
@@ -143,8 +144,8 @@ fn the_same_scene_as_obj_and_as_gltf() {
         assert_eq!(model.triangle_count(), 9);
         let names: Vec<_> = model.groups.iter().map(|group| group.name.as_str()).collect();
         assert_eq!(names, ["shed", "lawn"]);
-        let picture = decode_texture(&model.textures[0]).unwrap();
-        assert_eq!((picture.width, picture.height, picture.channels), (2, 2, 3));
+        let texture = decode_texture(&model.textures[0]).unwrap();
+        assert_eq!((texture.width, texture.height, texture.channels), (2, 2, 3));
     }
     // The floor's corner on a straight edge is used, so area and corners are the same.
     let area = |model: &Model| -> f64 {

@@ -1,11 +1,11 @@
-//! The list of a model's pictures: each file once, however many materials use it.
+//! The list of a model's textures: each file once, however many materials use it.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use crate::mesh::{TextureData, TextureSource};
 
-/// Collects pictures while materials are read.
+/// Collects textures while materials are read.
 #[derive(Default)]
 pub(super) struct Textures {
     /// In the order in which they were first used.
@@ -14,7 +14,7 @@ pub(super) struct Textures {
 }
 
 impl Textures {
-    /// The index of the picture in `file` with the opacity of `opacity`; `name` is for messages.
+    /// The index of the texture in `file` with the opacity of `opacity`; `name` is for messages.
     pub(super) fn file(&mut self, name: &str, file: PathBuf, opacity: Option<PathBuf>) -> u32 {
         let list = &mut self.list;
         *self.files.entry((file.clone(), opacity.clone())).or_insert_with(|| {
@@ -23,7 +23,7 @@ impl Textures {
         })
     }
 
-    /// The files of all pictures.
+    /// The files of all textures.
     pub(super) fn dependencies(&self) -> impl Iterator<Item = PathBuf> {
         self.list.iter().flat_map(|texture| {
             let file = match &texture.data {

@@ -1,4 +1,4 @@
-//! Materials and the pictures that they name, as imported.
+//! Materials and the textures that they name, as imported.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -6,10 +6,10 @@ use std::sync::Arc;
 /// How a texture continues outside 0–1 along one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Wrap {
-    /// The picture repeats (the default of OBJ and glTF).
+    /// The texture repeats (the default of OBJ and glTF).
     #[default]
     Repeat,
-    /// The picture repeats, every second time mirrored.
+    /// The texture repeats, every second time mirrored.
     Mirror,
     /// The last texel goes on for ever.
     Clamp,
@@ -61,7 +61,7 @@ impl Material {
     }
 }
 
-/// Where a picture's encoded bytes are. Nothing is decoded at import.
+/// Where a texture's encoded bytes are. Nothing is decoded at import.
 #[derive(Clone, Debug)]
 pub enum TextureData {
     /// A file of its own.
@@ -70,14 +70,14 @@ pub enum TextureData {
     Embedded(Arc<[u8]>),
 }
 
-/// A picture named by one or more materials.
+/// A texture named by one or more materials.
 #[derive(Clone, Debug)]
 pub struct TextureSource {
     /// For messages and file names: the path as the material gave it, or the glTF image's name.
     pub name: String,
     /// The encoded bytes.
     pub data: TextureData,
-    /// MTL's `map_d`: a second picture whose alpha (or, where it has none, luminance) is the
+    /// MTL's `map_d`: a second texture whose alpha (or, where it has none, luminance) is the
     /// opacity of this one. `None` where it is the same file or absent.
     pub opacity: Option<PathBuf>,
 }

@@ -1,18 +1,19 @@
-//! What the build side works on: imported [`Model`]s, [`Material`]s, and the [`Mesh`] of one piece.
+//! What the build side works on: imported [`Model`]s, [`Material`]s, and the [`Mesh`] of a block, a
+//! chunk or a node.
 
 mod coordinate;
+mod disjoint_set;
 mod material;
 mod model;
-mod piece;
 mod polygon;
-mod runs;
 mod surface;
+mod triangle_mesh;
 
 pub use coordinate::{Coordinate, Key, PositionKey, color_key, key, texcoord_key, wide};
+pub(crate) use disjoint_set::DisjointSet;
 pub use material::{AlphaMode, Material, TextureData, TextureSource, Wrap};
 pub use model::{Group, Model, Part, UpAxis, Warnings};
-pub use piece::Mesh;
-pub(crate) use piece::all_differ;
 pub(crate) use polygon::Triangulator;
-pub(crate) use runs::Runs;
 pub(crate) use surface::Surface;
+pub use triangle_mesh::Mesh;
+pub(crate) use triangle_mesh::all_differ;

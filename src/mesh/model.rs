@@ -93,7 +93,7 @@ pub struct Model {
     pub parts: Vec<Part>,
     /// Materials; the index is meaningful, the order is that of the source.
     pub materials: Vec<Material>,
-    /// Pictures that the materials use.
+    /// Textures that the materials use.
     pub textures: Vec<TextureSource>,
     /// The sky's direction where the format says (glTF: Y); `None` where it does not (OBJ).
     pub up: Option<UpAxis>,

@@ -23,7 +23,7 @@ pub(crate) struct Triangulator {
 impl Triangulator {
     /// The triangles of a polygon, as indices into its `corners`, in its winding.
     ///
-    /// Corners must be finite. Consecutive corners at the same place count as one. None where the
+    /// Corners must be finite. Consecutive corners at the same position count as one. None where the
     /// polygon has no area.
     pub(crate) fn triangulate(&mut self, corners: &[[f64; 3]]) -> &[[u32; 3]] {
         self.triangles.clear();
@@ -35,30 +35,31 @@ impl Triangulator {
             }
         }
         // Offsets from the first corner: UTM coordinates squared would leave no digits.
-        let place = |at: u32| DVec3::from(corners[at as usize]) - DVec3::from(corners[0]);
+        let position = |at: u32| DVec3::from(corners[at as usize]) - DVec3::from(corners[0]);
         match *self.ring.as_slice() {
             [a, b, c] => self.triangles.push([a, b, c]),
-            [a, b, c, d] if quad(&mut self.triangles, [a, b, c, d], [a, b, c, d].map(place)) => {}
+            [a, b, c, d] if quad(&mut self.triangles, [a, b, c, d], [a, b, c, d].map(position)) => {
+            }
             [_, _, _, _, ..] => {
-                let places: Vec<DVec3> = self.ring.iter().map(|at| place(*at)).collect();
-                self.clip(&places);
+                let positions: Vec<DVec3> = self.ring.iter().map(|at| position(*at)).collect();
+                self.clip(&positions);
             }
             _ => {}
         }
         &self.triangles
     }
 
-    /// Ear clipping of the ring whose corners are at `places`.
-    fn clip(&mut self, places: &[DVec3]) {
-        if !flatten(places, &mut self.flat) {
+    /// Ear clipping of the ring whose corners are at `positions`.
+    fn clip(&mut self, positions: &[DVec3]) {
+        if !flatten(positions, &mut self.flat) {
             return;
         }
         let earcut = self.earcut.get_or_insert_with(earcut::Earcut::new);
         earcut.earcut(self.flat.iter().copied(), &[] as &[u32], &mut self.clipped);
-        let place = |at: u32| DVec2::from(self.flat[at as usize]);
+        let position = |at: u32| DVec2::from(self.flat[at as usize]);
         // The ring is counter-clockwise in the plane, and so shall be its triangles.
         self.triangles.extend(self.clipped.as_chunks::<3>().0.iter().map(|&[a, b, c]| {
-            let turned = (place(b) - place(a)).perp_dot(place(c) - place(a)) < 0.0;
+            let turned = (position(b) - position(a)).perp_dot(position(c) - position(a)) < 0.0;
             if turned { [a, c, b] } else { [a, b, c] }
         }));
         // A ring of n corners has n − 2 triangles; fewer, and a corner was left out somewhere.
@@ -91,11 +92,11 @@ fn quad(triangles: &mut Vec<[u32; 3]>, ring: [u32; 4], at: [DVec3; 4]) -> bool {
 
 /// Projects the ring along the axis that its Newell normal is nearest to, counter-clockwise, which
 /// keeps the coordinates' bits and with them what lies on a line. False where it has no area.
-fn flatten(places: &[DVec3], flat: &mut Vec<[f64; 2]>) -> bool {
+fn flatten(positions: &[DVec3], flat: &mut Vec<[f64; 2]>) -> bool {
     let mut normal = DVec3::ZERO;
-    for (at, place) in places.iter().enumerate() {
-        let next = places[(at + 1) % places.len()];
-        normal += place.cross(next);
+    for (at, position) in positions.iter().enumerate() {
+        let next = positions[(at + 1) % positions.len()];
+        normal += position.cross(next);
     }
     let size = normal.abs();
     flat.clear();
@@ -107,7 +108,7 @@ fn flatten(places: &[DVec3], flat: &mut Vec<[f64; 2]>) -> bool {
         _ if normal.z > 0.0 => |p| [p.x, p.y],
         _ => |p| [p.y, p.x],
     };
-    flat.extend(places.iter().map(project));
+    flat.extend(positions.iter().map(project));
     size.is_finite() && size.max_element() > 0.0
 }
 
@@ -124,8 +125,8 @@ fn restore_corners(flat: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) {
     while triangles.len() + 2 < flat.len() {
         let mut uses: BTreeMap<(u32, u32), i32> = BTreeMap::new();
         for triangle in triangles.iter() {
-            for side in 0..3 {
-                *uses.entry((triangle[side], triangle[(side + 1) % 3])).or_default() += 1;
+            for edge in 0..3 {
+                *uses.entry((triangle[edge], triangle[(edge + 1) % 3])).or_default() += 1;
             }
         }
         let used = |a: u32, b: u32| uses.contains_key(&(a, b));
@@ -143,10 +144,10 @@ fn restore_corners(flat: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) {
         let mut divided = Vec::with_capacity(flat.len() - 2);
         let mut any = false;
         for &triangle in triangles.iter() {
-            let chain = (0..3).find_map(|side| {
-                let (a, b) = (triangle[side], triangle[(side + 1) % 3]);
+            let chain = (0..3).find_map(|edge| {
+                let (a, b) = (triangle[edge], triangle[(edge + 1) % 3]);
                 let chain = open(a, b).then(|| chain(flat, &wanted, a, b)).flatten()?;
-                Some((chain, triangle[(side + 2) % 3]))
+                Some((chain, triangle[(edge + 2) % 3]))
             });
             match chain {
                 Some((chain, apex)) => {
@@ -166,14 +167,14 @@ fn restore_corners(flat: &[[f64; 2]], triangles: &mut Vec<[u32; 3]>) {
 /// The corners from `a` to `b` along wanted edges that lie on the line between them, both ends
 /// included; `None` where there is no such chain of more than one edge.
 fn chain(flat: &[[f64; 2]], wanted: &BTreeMap<u32, Vec<u32>>, a: u32, b: u32) -> Option<Vec<u32>> {
-    let place = |at: u32| DVec2::from(flat[at as usize]);
-    let (start, along) = (place(a), place(b) - place(a));
+    let position = |at: u32| DVec2::from(flat[at as usize]);
+    let (start, along) = (position(a), position(b) - position(a));
     let length = along.length_squared();
     let mut chain = vec![a];
     let (mut at, mut reached) = (a, 0.0);
     while at != b {
         let (next, distance) = wanted.get(&at)?.iter().find_map(|&next| {
-            let offset = place(next) - start;
+            let offset = position(next) - start;
             let distance = along.dot(offset);
             // earcut leaves out what is exactly straight, and so the tolerance is rounding alone.
             let straight = along.perp_dot(offset).abs() <= STRAIGHT * length;
@@ -192,6 +193,7 @@ const STRAIGHT: f64 = 1e-9;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     /// Twice the vector area.
     fn area(corners: &[[f64; 3]], ring: &[u32]) -> DVec3 {
@@ -212,8 +214,8 @@ mod tests {
             let own = area(corners, triangle);
             assert!(own.dot(whole) >= 0.0, "{triangle:?} is turned: {triangles:?}");
             sum += own;
-            for side in 0..3 {
-                *edges.entry((triangle[side], triangle[(side + 1) % 3])).or_insert(0) += 1;
+            for edge in 0..3 {
+                *edges.entry((triangle[edge], triangle[(edge + 1) % 3])).or_insert(0) += 1;
             }
         }
         assert!((sum - whole).length() <= 1e-9 * whole.length(), "{sum} for {whole}");
@@ -340,19 +342,13 @@ mod tests {
 
     #[test]
     fn random_stars_on_a_coarse_lattice_keep_area_and_edges() {
-        let mut state = 7_u64;
-        let mut random = |below: u64| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) % below
-        };
+        let mut random = Random::new(7, 0);
         for _ in 0..500 {
             // Columns of rising x, a jagged lower and upper side: simple, often straight.
-            let columns = 2 + random(12) as i32;
+            let columns = 2 + random.below(12) as i32;
             let mut ring: Vec<[f64; 2]> =
-                (0..columns).map(|x| [f64::from(x), -1.0 - random(3) as f64]).collect();
-            ring.extend((0..columns).rev().map(|x| [f64::from(x), 1.0 + random(3) as f64]));
+                (0..columns).map(|x| [f64::from(x), -1.0 - random.below(3) as f64]).collect();
+            ring.extend((0..columns).rev().map(|x| [f64::from(x), 1.0 + random.below(3) as f64]));
             assert_eq!(check(&flat(&ring)).len(), ring.len() - 2, "{ring:?}");
         }
     }

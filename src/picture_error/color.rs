@@ -8,6 +8,7 @@ use image::RgbImage;
 use rayon::prelude::*;
 
 use super::filter::Plane;
+use crate::color::srgb_to_linear;
 
 /// From linear RGB to XYZ, by rows; IEC 61966-2-1 in fractions, as FLIP has it.
 const XYZ: [[f64; 3]; 3] = [
@@ -29,15 +30,9 @@ static SPACES: LazyLock<Spaces> = LazyLock::new(|| {
         row.map(|part| (part / white) as f32)
     };
     let relative_xyz = Mat3::from_cols_array_2d(&XYZ.map(row)).transpose();
+    let linear = |byte: usize| srgb_to_linear(byte as f64 / 255.0) as f32;
     Spaces { relative_xyz, rgb: relative_xyz.inverse(), linear: std::array::from_fn(linear) }
 });
-
-/// The light of an sRGB value.
-fn linear(byte: usize) -> f32 {
-    let value = byte as f64 / 255.0;
-    let light = if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) };
-    light as f32
-}
 
 /// YCxCz of a picture: lightness, red against green, yellow against blue.
 pub(super) fn opponent(picture: &RgbImage) -> [Plane; 3] {

@@ -11,6 +11,7 @@ mod crs;
 mod degrees;
 mod ellipsoid;
 mod fit;
+mod parameters;
 #[cfg(test)]
 mod tests;
 
@@ -21,6 +22,7 @@ pub use crs::Crs;
 pub use degrees::Degrees;
 pub use ellipsoid::{east_north_up, to_ecef, wgs84_to_ecef};
 pub use fit::Fit;
+pub use parameters::{PLACEMENT, placement_of};
 
 use crate::mesh::{Model, UpAxis};
 use crate::{Error, Result};

@@ -49,7 +49,7 @@ impl Target {
         let usage = if keep_depths { TextureUsages::COPY_SRC } else { TextureUsages::empty() };
         let depth = texture("depth", DEPTH_FORMAT, usage);
         let [r, g, b] = background
-            .map(|byte| f64::from(crate::texture::srgb::to_linear()[usize::from(byte)]) / 65535.0);
+            .map(|byte| f64::from(crate::color::byte_to_linear()[usize::from(byte)]) / 65535.0);
         Self {
             size,
             color_view: color.create_view(&Default::default()),

@@ -51,7 +51,7 @@ pub struct BuildReport {
 pub struct InputReport {
     /// As given, or as found in a given folder.
     pub path: String,
-    /// All files that were read for it or that it names: the model, its materials, its pictures.
+    /// All files that were read for it or that it names: the model, its materials, its textures.
     pub files: Vec<FileReport>,
     /// Its triangles after import.
     pub triangles: u64,
@@ -124,9 +124,9 @@ pub struct LevelReport {
     pub nodes: u64,
     /// Triangles of all of them.
     pub triangles: u64,
-    /// Triangles with a picture.
+    /// Triangles with a texture.
     pub textured_triangles: u64,
-    /// Texels of pictures in the nodes' files.
+    /// Texels of textures in the nodes' files.
     pub texels: u64,
     /// Bytes of the nodes' files.
     pub bytes: u64,

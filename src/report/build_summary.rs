@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::build_report::{BuildReport, Quantized, UpFrom};
-use crate::build::options::placement_of;
+use crate::place::placement_of;
 use crate::place::{Place, Placement};
 
 /// Warnings that are shown; the rest is in `build.json`.

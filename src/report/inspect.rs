@@ -58,6 +58,8 @@ fn node_json(scene: &Scene, node: &Node) -> Value {
         "static_benefit": node.static_benefit,
         "average_normal": node.average_normal.map(shortest),
         "geometric_error": node.geometric_error,
+        "mean_error": node.mean_error,
+        "p95_error": node.p95_error,
         "texels": node.texels,
         "pictures": node.pictures,
         "shared_texels": node.shared_texels,
@@ -219,12 +221,13 @@ fn node_line(out: &mut String, scene: &Scene, index: u32, depth: usize) {
     push(
         out,
         format_args!(
-            "{}{}: {} triangles{textures}, {}, error {}, cost {:.1}{below}",
+            "{}{}: {} triangles{textures}, {}, error {} (mean {}), cost {:.1}{below}",
             indent(depth),
             node.file,
             node.triangles,
             size(node.file_bytes),
             metres(node.geometric_error),
+            metres(node.mean_error),
             node.cost
         ),
     );
@@ -317,6 +320,8 @@ mod tests {
             "static_benefit",
             "average_normal",
             "geometric_error",
+            "mean_error",
+            "p95_error",
             "texels",
             "file",
             "file_bytes",

@@ -1,11 +1,12 @@
-//! A node's atlas: which texels it takes from the level pictures and where they go.
+//! A node's atlas: which texels it takes from the level images and where they go.
 
 use super::bits::BitGrid;
 use super::charts::UvBox;
 use super::fill;
 use super::islands::Islands;
-use super::level::LevelPicture;
-use super::pack::{self, Packing, Placement};
+use super::level::LevelImage;
+use super::pack;
+use super::packing::{Packing, Placement};
 use super::raster::{self, Rasterizer};
 use super::shape::Shape;
 use super::split;
@@ -13,7 +14,7 @@ use super::split;
 /// Sides of atlases are multiples of this, so that two mip levels are exact halves.
 const SIDE_MULTIPLE: usize = 4;
 
-/// A lone picture whose triangles fill their bounding box to this part is cropped, not packed.
+/// A lone image whose triangles fill their bounding box to this part is cropped, not packed.
 const CROP_FILL: f64 = 0.9;
 
 /// An island that fills its bounding box to this part is packed as it is, else divided.
@@ -22,36 +23,36 @@ const ISLAND_FILL: f64 = 0.95;
 /// What one atlas is made of.
 pub(crate) struct Sheet<'a> {
     /// All have the same number of channels.
-    pub pictures: Vec<SheetPicture<'a>>,
+    pub images: Vec<SheetImage<'a>>,
     /// Texels per cell: a power of two. Mip levels down to one texel a cell mix no patches.
     pub cell: usize,
     /// Longest side of a page.
     pub max_side: usize,
 }
 
-/// A level picture and the triangles over it.
-pub(crate) struct SheetPicture<'a> {
-    pub picture: &'a LevelPicture,
-    /// The corners of the triangles, in the picture's texels and inside it.
+/// A level image and the triangles over it.
+pub(crate) struct SheetImage<'a> {
+    pub image: &'a LevelImage,
+    /// The corners of the triangles, in the image's texels and inside it.
     pub corners: Vec<[[f64; 2]; 3]>,
     /// The chart of each triangle.
     pub charts: Vec<u32>,
 }
 
-/// Where the texels of a patch went: triangles whose texels keep their relative places.
+/// Where the texels of a patch went: triangles whose texels keep their relative positions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct PatchPlace {
+pub(crate) struct PatchPlacement {
     pub page: usize,
-    /// True where columns and rows of the level picture are exchanged in the page.
-    pub turned: bool,
-    /// Added to a position in the level picture, turned where it is, gives that in the page.
+    /// True where columns and rows of the level image are exchanged in the page.
+    pub transposed: bool,
+    /// Added to a position in the level image, transposed where it is, gives that in the page.
     pub shift: [f64; 2],
 }
 
-impl PatchPlace {
-    /// Where a position of the level picture is in the page, in texels.
+impl PatchPlacement {
+    /// Where a position of the level image is in the page, in texels.
     pub fn texel(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let [x, y] = if self.turned { [y, x] } else { [x, y] };
+        let [x, y] = if self.transposed { [y, x] } else { [x, y] };
         [x + self.shift[0], y + self.shift[1]]
     }
 }
@@ -67,14 +68,14 @@ pub(crate) struct Page {
 #[derive(Debug, Default)]
 pub(crate) struct Atlas {
     pub pages: Vec<Page>,
-    pub places: Vec<PatchPlace>,
-    /// For each picture of the sheet the patch of each triangle.
+    pub placements: Vec<PatchPlacement>,
+    /// For each image of the sheet the patch of each triangle.
     pub patches: Vec<Vec<u32>>,
     /// True where the page's opposite sides meet and patches lie across them.
     pub wraps: bool,
 }
 
-/// A window of a level picture, in texels; it may reach beyond the picture, whose border texels
+/// A window of a level image, in texels; it may reach beyond the image, whose border texels
 /// then go on.
 #[derive(Clone, Copy)]
 struct Window {
@@ -82,9 +83,9 @@ struct Window {
     size: [usize; 2],
 }
 
-/// A patch to be packed: a shape of cells of one picture.
+/// A patch to be packed: a shape of cells of one image.
 struct Patch {
-    picture: usize,
+    image: usize,
     /// Texel of the shape's corner; multiples of the cell.
     origin: [isize; 2],
     shape: Shape,
@@ -92,14 +93,14 @@ struct Patch {
 
 impl Sheet<'_> {
     /// Packs and copies. `None` where something does not fit a page, or all does not fit
-    /// `max_pages`: the caller must take coarser pictures.
+    /// `max_pages`: the caller must take coarser images.
     pub fn build(&self, max_pages: usize) -> Option<Atlas> {
-        let lone = match self.pictures.as_slice() {
+        let lone = match self.images.as_slice() {
             [lone] => self.window(lone),
             _ => None,
         };
         if let Some(window) = lone {
-            let area: f64 = self.pictures[0].corners.iter().map(area).sum();
+            let area: f64 = self.images[0].corners.iter().map(area).sum();
             let inner = window.size.map(|side| side.saturating_sub(2).max(1) as f64);
             if area >= CROP_FILL * inner[0] * inner[1] {
                 return Some(self.crop(window));
@@ -121,11 +122,11 @@ impl Sheet<'_> {
     }
 
     /// The window that holds all triangles' texels, if it fits a page.
-    fn window(&self, lone: &SheetPicture) -> Option<Window> {
+    fn window(&self, lone: &SheetImage) -> Option<Window> {
         let bounds = bounds(&lone.corners);
         let mut window = Window { origin: [0; 2], size: [0; 2] };
         for axis in 0..2 {
-            let side = lone.picture.size[axis];
+            let side = lone.image.size[axis];
             let (start, end) = raster::touched(bounds.min[axis], bounds.max[axis], side);
             let size = (end.saturating_sub(start)).max(1).next_multiple_of(SIDE_MULTIPLE);
             if size > self.max_side {
@@ -139,12 +140,12 @@ impl Sheet<'_> {
     }
 
     fn crop(&self, window: Window) -> Atlas {
-        let lone = &self.pictures[0];
-        let page = Page::window(lone.picture, window);
+        let lone = &self.images[0];
+        let page = Page::window(lone.image, window);
         let shift = window.origin.map(|start| -(start as f64));
         Atlas {
             pages: vec![page],
-            places: vec![PatchPlace { page: 0, turned: false, shift }],
+            placements: vec![PatchPlacement { page: 0, transposed: false, shift }],
             patches: vec![vec![0; lone.corners.len()]],
             wraps: false,
         }
@@ -154,17 +155,17 @@ impl Sheet<'_> {
     fn patches(&self) -> (Vec<Patch>, Vec<Vec<u32>>) {
         let mut patches = Vec::new();
         let mut assigned = Vec::new();
-        for (index, picture) in self.pictures.iter().enumerate() {
-            let all: Vec<u32> = (0..picture.corners.len() as u32).collect();
-            let (origin, grid) = self.cells(picture, &all);
+        for (index, image) in self.images.iter().enumerate() {
+            let all: Vec<u32> = (0..image.corners.len() as u32).collect();
+            let (origin, grid) = self.cells(image, &all);
             let islands = Islands::find(&grid);
-            let members = self.members(picture, origin, &islands);
-            let mut patch_of = vec![0; picture.corners.len()];
+            let members = self.members(image, origin, &islands);
+            let mut patch_of = vec![0; image.corners.len()];
             let parts = islands.shapes.into_iter().zip(islands.origins).zip(members);
             for ((shape, start), members) in parts {
                 let fill = shape.area() as f64 / (shape.size[0] * shape.size[1]) as f64;
                 let parts = if fill < ISLAND_FILL {
-                    split::split(&picture.corners, members, 1.5 * self.cell as f64)
+                    split::split(&image.corners, members, 1.5 * self.cell as f64)
                 } else {
                     vec![members]
                 };
@@ -172,15 +173,15 @@ impl Sheet<'_> {
                 for part in &parts {
                     part.iter().for_each(|t| patch_of[*t as usize] = patches.len() as u32);
                     if !whole {
-                        let (origin, grid) = self.cells(picture, part);
+                        let (origin, grid) = self.cells(image, part);
                         let shape = Shape::of(&grid);
-                        patches.push(Patch { picture: index, origin, shape });
+                        patches.push(Patch { image: index, origin, shape });
                     }
                 }
                 if whole {
                     let origin =
                         [0, 1].map(|axis| origin[axis] + (start[axis] * self.cell) as isize);
-                    patches.push(Patch { picture: index, origin, shape });
+                    patches.push(Patch { image: index, origin, shape });
                 }
             }
             assigned.push(patch_of);
@@ -188,18 +189,18 @@ impl Sheet<'_> {
         (patches, assigned)
     }
 
-    /// The cells that triangles of a picture use, and the texel where their grid begins.
-    fn cells(&self, picture: &SheetPicture, triangles: &[u32]) -> ([isize; 2], BitGrid) {
+    /// The cells that triangles of an image use, and the texel where their grid begins.
+    fn cells(&self, image: &SheetImage, triangles: &[u32]) -> ([isize; 2], BitGrid) {
         let scale = 1.0 / self.cell as f64;
         let mut bounds = UvBox::EMPTY;
         for triangle in triangles {
-            picture.corners[*triangle as usize].iter().for_each(|corner| bounds.add(*corner));
+            image.corners[*triangle as usize].iter().for_each(|corner| bounds.add(*corner));
         }
         let mut first = [0; 2];
         let mut size = [0; 2];
         for axis in 0..2 {
-            // Sampling at the picture's border reads one cell beyond it, so cell −1 is the first.
-            let count = picture.picture.size[axis].div_ceil(self.cell) + 2;
+            // Sampling at the image's border reads one cell beyond it, so cell −1 is the first.
+            let count = image.image.size[axis].div_ceil(self.cell) + 2;
             let (low, high) = (bounds.min[axis] * scale + 1.0, bounds.max[axis] * scale + 1.0);
             let (start, end) = raster::touched(low, high, count);
             first[axis] = start as isize - 1;
@@ -208,35 +209,27 @@ impl Sheet<'_> {
         let mut grid = BitGrid::new(size[0], size[1]);
         let start = first.map(|cell| cell as f64);
         let to_cells = |at: [f64; 2]| [0, 1].map(|axis| at[axis] * scale - start[axis]);
-        let filled = if triangles.len() == picture.corners.len() {
-            picture.filled_charts()
-        } else {
-            Vec::new()
-        };
+        let filled =
+            if triangles.len() == image.corners.len() { image.filled_charts() } else { Vec::new() };
         for bounds in filled.iter().flatten() {
             raster::mark_box(to_cells(bounds.min), to_cells(bounds.max), &mut grid);
         }
         let others = triangles.iter().map(|triangle| *triangle as usize).filter(|triangle| {
-            !matches!(filled.get(picture.charts[*triangle] as usize), Some(Some(_)))
+            !matches!(filled.get(image.charts[*triangle] as usize), Some(Some(_)))
         });
-        let others = others.map(|triangle| picture.corners[triangle].map(to_cells));
+        let others = others.map(|triangle| image.corners[triangle].map(to_cells));
         Rasterizer::default().mark_all(others, &mut grid);
         (first.map(|cell| cell * self.cell as isize), grid)
     }
 
     /// The triangles of each island. A chart lies in one island, so its first triangle tells.
-    fn members(
-        &self,
-        picture: &SheetPicture,
-        origin: [isize; 2],
-        islands: &Islands,
-    ) -> Vec<Vec<u32>> {
+    fn members(&self, image: &SheetImage, origin: [isize; 2], islands: &Islands) -> Vec<Vec<u32>> {
         let mut members = vec![Vec::new(); islands.shapes.len()];
-        let charts = picture.charts.iter().max().map_or(0, |chart| *chart as usize + 1);
+        let charts = image.charts.iter().max().map_or(0, |chart| *chart as usize + 1);
         let mut island_of = vec![None; charts];
-        for (triangle, chart) in picture.charts.iter().enumerate() {
+        for (triangle, chart) in image.charts.iter().enumerate() {
             let island = *island_of[*chart as usize].get_or_insert_with(|| {
-                let corner = picture.corners[triangle][0];
+                let corner = image.corners[triangle][0];
                 let cell = [0, 1]
                     .map(|axis| (corner[axis] - origin[axis] as f64).max(0.0) as usize / self.cell);
                 islands.at(cell[0], cell[1]).unwrap_or(0)
@@ -249,7 +242,7 @@ impl Sheet<'_> {
     }
 
     fn compose(&self, patches: &[Patch], packing: &Packing, assigned: Vec<Vec<u32>>) -> Atlas {
-        let channels = self.pictures.first().map_or(3, |picture| picture.picture.channels);
+        let channels = self.images.first().map_or(3, |image| image.image.channels);
         let side = |cells: usize| (cells * self.cell).max(1).next_multiple_of(SIDE_MULTIPLE);
         let mut pages: Vec<Page> =
             packing.pages.iter().map(|size| Page::new(size.map(side), channels)).collect();
@@ -260,22 +253,22 @@ impl Sheet<'_> {
                 BitGrid::new(width, height)
             })
             .collect();
-        let mut places = Vec::with_capacity(patches.len());
+        let mut placements = Vec::with_capacity(patches.len());
         for (patch, placement) in patches.iter().zip(&packing.placements) {
             let page = &mut pages[placement.page];
             self.copy_patch(patch, placement, page, &mut owned[placement.page]);
             let origin = patch.origin.map(|texel| texel as f64);
-            let [x, y] = if placement.turned { [origin[1], origin[0]] } else { origin };
-            places.push(PatchPlace {
+            let [x, y] = if placement.transposed { [origin[1], origin[0]] } else { origin };
+            placements.push(PatchPlacement {
                 page: placement.page,
-                turned: placement.turned,
+                transposed: placement.transposed,
                 shift: [(placement.x * self.cell) as f64 - x, (placement.y * self.cell) as f64 - y],
             });
         }
         for (page, owned) in pages.iter_mut().zip(&owned) {
             page.fill_empty_cells(owned, self.cell);
         }
-        Atlas { pages, places, patches: assigned, wraps: packing.wraps }
+        Atlas { pages, placements, patches: assigned, wraps: packing.wraps }
     }
 
     /// Copies a patch's cells, over the page's sides where it lies across them.
@@ -286,9 +279,9 @@ impl Sheet<'_> {
         page: &mut Page,
         owned: &mut BitGrid,
     ) {
-        let picture = self.pictures[patch.picture].picture;
+        let image = self.images[patch.image].image;
         let sides = [owned.width(), owned.height()];
-        let along = usize::from(placement.turned);
+        let along = usize::from(placement.transposed);
         for [row, from, to] in &patch.shape.runs {
             let mut from = *from as usize;
             while from < *to as usize {
@@ -304,12 +297,12 @@ impl Sheet<'_> {
                     size: [count * self.cell, self.cell],
                 };
                 let texel = target.map(|cell| cell * self.cell);
-                if placement.turned {
+                if placement.transposed {
                     (target[1]..target[1] + count).for_each(|y| owned.set(target[0], y));
-                    page.copy_turned(picture, window, texel);
+                    page.copy_transposed(image, window, texel);
                 } else {
                     owned.set_span(target[1], target[0], target[0] + count);
-                    page.copy(picture, window, texel);
+                    page.copy(image, window, texel);
                 }
                 from += count;
             }
@@ -317,7 +310,7 @@ impl Sheet<'_> {
     }
 }
 
-impl SheetPicture<'_> {
+impl SheetImage<'_> {
     /// By chart: its box, where its triangles fill it.
     fn filled_charts(&self) -> Vec<Option<UvBox>> {
         let count = self.charts.iter().max().map_or(0, |chart| *chart as usize + 1);
@@ -341,20 +334,20 @@ impl Page {
     }
 
     /// A window as a page of its own.
-    fn window(picture: &LevelPicture, window: Window) -> Self {
+    fn window(image: &LevelImage, window: Window) -> Self {
         let inside = (0..2).all(|axis| {
             let end = window.origin[axis] + window.size[axis] as isize;
-            window.origin[axis] >= 0 && end <= picture.size[axis] as isize
+            window.origin[axis] >= 0 && end <= image.size[axis] as isize
         });
         if !inside {
-            let mut page = Self::new(window.size, picture.channels);
-            page.copy(picture, window, [0; 2]);
+            let mut page = Self::new(window.size, image.channels);
+            page.copy(image, window, [0; 2]);
             return page;
         }
         let [left, top] = window.origin.map(|start| start as usize);
         let [width, height] = window.size;
-        let mut pixels = Vec::with_capacity(width * height * picture.channels);
-        (top..top + height).for_each(|y| pixels.extend_from_slice(picture.row(y, left, width)));
+        let mut pixels = Vec::with_capacity(width * height * image.channels);
+        (top..top + height).for_each(|y| pixels.extend_from_slice(image.row(y, left, width)));
         Self { size: window.size, pixels }
     }
 
@@ -362,17 +355,17 @@ impl Page {
         self.pixels.len() / (self.size[0] * self.size[1]).max(1)
     }
 
-    /// Copies a window of a picture to `target`; beyond the picture its border texels go on.
-    fn copy(&mut self, picture: &LevelPicture, window: Window, target: [usize; 2]) {
-        let channels = picture.channels;
-        let [columns, rows] = picture.size;
+    /// Copies a window of an image to `target`; beyond the image its border texels go on.
+    fn copy(&mut self, image: &LevelImage, window: Window, target: [usize; 2]) {
+        let channels = image.channels;
+        let [columns, rows] = image.size;
         let width = window.size[0].min(self.size[0] - target[0]);
         let before = (window.origin[0].min(0).unsigned_abs()).min(width - 1);
         let start = (window.origin[0].max(0) as usize).min(columns - 1);
         let inside = (width - before).min(columns - start);
         for y in 0..window.size[1].min(self.size[1] - target[1]) {
             let row = (window.origin[1] + y as isize).clamp(0, rows as isize - 1) as usize;
-            let source = picture.row(row, start, inside);
+            let source = image.row(row, start, inside);
             let at = ((target[1] + y) * self.size[0] + target[0]) * channels;
             let copied = &mut self.pixels[at..at + width * channels];
             let (left, copied) = copied.split_at_mut(before * channels);
@@ -388,10 +381,10 @@ impl Page {
     }
 
     /// The same with columns and rows exchanged.
-    fn copy_turned(&mut self, picture: &LevelPicture, window: Window, target: [usize; 2]) {
-        let channels = picture.channels;
+    fn copy_transposed(&mut self, image: &LevelImage, window: Window, target: [usize; 2]) {
+        let channels = image.channels;
         let mut upright = Page::new(window.size, channels);
-        upright.copy(picture, window, [0; 2]);
+        upright.copy(image, window, [0; 2]);
         let [width, height] = window.size;
         for y in 0..width.min(self.size[1] - target[1]) {
             for x in 0..height.min(self.size[0] - target[0]) {

@@ -4,15 +4,17 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::bake::{BakeClasses, BakePlan, BakeReason, Seams, Source};
+use super::bake::classes::BakeClasses;
+use super::bake::plan::{BakePlan, BakeReason, Seams};
+use super::bake::source::Source;
 use super::bits::BitGrid;
 use super::cache::{Decoded, TextureCache};
 use super::charts::{self, Charts, UvBox};
-use super::level::{self, LevelPicture, Region};
+use super::level::{self, LevelImage, Region};
 use super::plan::{self, TextureUse};
 use super::raster::{self, Rasterizer};
 use super::shared::SharedTextures;
-use crate::import::Picture;
+use crate::decode::DecodedTexture;
 use crate::mesh::{Mesh, Model};
 
 /// What of the texture work can be chosen.
@@ -84,15 +86,15 @@ pub(super) enum Prepared {
 /// A texture whose texels the nodes copy.
 #[derive(Debug)]
 pub(super) struct AtlasSource {
-    /// Of the whole picture.
+    /// Of the whole image.
     pub size: [f64; 2],
     /// First texel of the region.
     pub origin: [f64; 2],
-    /// Along which axes charts cross the picture's border.
+    /// Along which axes charts cross the image's border.
     pub wraps: [bool; 2],
     pub channels: usize,
     /// By level.
-    pub levels: Vec<LevelPicture>,
+    pub levels: Vec<LevelImage>,
 }
 
 impl AtlasSource {
@@ -138,20 +140,19 @@ impl<'a> BlockTextures<'a> {
                     return (texture, Prepared::Absent, 0);
                 };
                 let whole = plan.texture_use(texture) == TextureUse::Repeating;
-                let found =
-                    if whole { None } else { usage.region(texture, &decoded.picture, mesh) };
+                let found = if whole { None } else { usage.region(texture, &decoded.image, mesh) };
                 let Some(Found { region, wraps, used_texels }) = found else {
                     return (texture, Prepared::Repeating(decoded), 0);
                 };
-                // Where no other block waits for the picture, it becomes this one's own.
-                let picture = Arc::try_unwrap(decoded)
-                    .map_or_else(|shared| Arc::clone(&shared.picture), |own| own.picture);
+                // Where no other block waits for the image, it becomes this one's own.
+                let image = Arc::try_unwrap(decoded)
+                    .map_or_else(|shared| Arc::clone(&shared.image), |own| own.image);
                 let source = AtlasSource {
-                    size: [f64::from(picture.width), f64::from(picture.height)],
+                    size: [f64::from(image.width), f64::from(image.height)],
                     origin: region.origin.map(|start| start as f64),
                     wraps,
-                    channels: usize::from(picture.channels),
-                    levels: level::level_pictures(picture, &region, &steps),
+                    channels: usize::from(image.channels),
+                    levels: level::level_images(image, &region, &steps),
                 };
                 (texture, Prepared::Atlas(source), used_texels)
             })
@@ -272,7 +273,7 @@ struct Usage {
     triangles: Vec<Vec<[u32; 3]>>,
 }
 
-/// The part of a picture that a block uses.
+/// The part of an image that a block uses.
 struct Found {
     region: Region,
     wraps: [bool; 2],
@@ -303,10 +304,10 @@ impl Usage {
         Self { charts, areas, triangles }
     }
 
-    /// The region of a texture, or `None` where charts are too long to be cut out of one picture.
-    fn region(&self, texture: u32, picture: &Picture, mesh: &Mesh) -> Option<Found> {
+    /// The region of a texture, or `None` where charts are too long to be cut out of one image.
+    fn region(&self, texture: u32, image: &DecodedTexture, mesh: &Mesh) -> Option<Found> {
         let triangles = &self.triangles[texture as usize];
-        let size = [picture.width as usize, picture.height as usize];
+        let size = [image.width as usize, image.height as usize];
         let mut charts: Vec<u32> =
             triangles.iter().map(|t| self.charts.of_vertex[t[0] as usize]).collect();
         charts.sort_unstable();

@@ -1,37 +1,37 @@
-//! Decoded pictures, shared between the blocks that use them and dropped after the last.
+//! Decoded images, shared between the blocks that use them and dropped after the last.
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::plan::TexturePlan;
-use crate::import::{self, Picture};
+use crate::decode::{self, DecodedTexture};
 use crate::mesh::{Model, Warnings};
 
-/// A decoded picture and what names it.
+/// A decoded image and what names it.
 #[derive(Debug)]
 pub(crate) struct Decoded {
-    pub picture: Arc<Picture>,
+    pub image: Arc<DecodedTexture>,
     hash: OnceLock<blake3::Hash>,
 }
 
 impl Decoded {
-    pub fn new(picture: Picture) -> Self {
-        Self { picture: Arc::new(picture), hash: OnceLock::new() }
+    pub fn new(image: DecodedTexture) -> Self {
+        Self { image: Arc::new(image), hash: OnceLock::new() }
     }
 
-    /// Of the texels and the size, so that equal pictures of different inputs are one.
+    /// Of the texels and the size, so that equal images of different inputs are one.
     pub fn hash(&self) -> &blake3::Hash {
         self.hash.get_or_init(|| {
             let mut hasher = blake3::Hasher::new();
-            hasher.update(&self.picture.width.to_le_bytes());
-            hasher.update(&self.picture.height.to_le_bytes());
-            hasher.update(&[self.picture.channels]);
-            hasher.update(&self.picture.pixels);
+            hasher.update(&self.image.width.to_le_bytes());
+            hasher.update(&self.image.height.to_le_bytes());
+            hasher.update(&[self.image.channels]);
+            hasher.update(&self.image.pixels);
             hasher.finalize()
         })
     }
 }
 
-/// The pictures of one input. Each is decoded when the first block takes it, and let go of when
+/// The images of one input. Each is decoded when the first block takes it, and let go of when
 /// the last one has taken it.
 #[derive(Debug)]
 pub struct TextureCache<'a> {
@@ -72,7 +72,7 @@ impl<'a> TextureCache<'a> {
         Self { model, plan, slots: slots.into_iter().map(Mutex::new).collect() }
     }
 
-    /// The model whose pictures these are.
+    /// The model whose images these are.
     pub fn model(&self) -> &'a Model {
         self.model
     }
@@ -82,7 +82,7 @@ impl<'a> TextureCache<'a> {
         self.plan
     }
 
-    /// The picture, decoded now if it is not yet; `None` where it cannot be. To be called once
+    /// The image, decoded now if it is not yet; `None` where it cannot be. To be called once
     /// for each block that was announced.
     pub(crate) fn take(&self, texture: u32) -> Option<Arc<Decoded>> {
         let slot = self.slots.get(texture as usize)?;
@@ -101,21 +101,21 @@ impl<'a> TextureCache<'a> {
 
     fn decode(&self, texture: u32) -> State {
         let source = &self.model.textures[texture as usize];
-        let picture = match import::decode_texture(source) {
-            Ok(picture) => picture,
+        let image = match decode::decode_texture(source) {
+            Ok(image) => image,
             Err(error) => return State::Failed(error.to_string()),
         };
-        let bytes = picture.texels() * u64::from(picture.channels);
-        if picture.texels() == 0 || picture.pixels.len() as u64 != bytes {
-            let size = format!("{} × {}", picture.width, picture.height);
-            return State::Failed(format!("{}: a picture of {size} texels", source.name));
+        let bytes = image.texels() * u64::from(image.channels);
+        if image.texels() == 0 || image.pixels.len() as u64 != bytes {
+            let size = format!("{} × {}", image.width, image.height);
+            return State::Failed(format!("{}: an image of {size} texels", source.name));
         }
-        let alpha = self.plan.needs_alpha(texture) && picture.has_transparency();
-        let picture = if alpha { picture } else { picture.into_opaque() };
-        State::Decoded(Arc::new(Decoded::new(picture)))
+        let alpha = self.plan.needs_alpha(texture) && image.has_transparency();
+        let image = if alpha { image } else { image.into_opaque() };
+        State::Decoded(Arc::new(Decoded::new(image)))
     }
 
-    /// One warning for each picture that could not be decoded, in the model's order.
+    /// One warning for each image that could not be decoded, in the model's order.
     pub fn warnings(&self) -> Warnings {
         let mut warnings = Warnings::default();
         for slot in &self.slots {

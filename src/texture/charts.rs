@@ -1,6 +1,8 @@
 //! Charts: triangles that hang together over shared vertices, and the box of their texture
 //! coordinates.
 
+use crate::mesh::DisjointSet;
+
 /// No chart: the vertex is in no triangle that was asked for.
 pub(crate) const NO_CHART: u32 = u32::MAX;
 
@@ -75,51 +77,32 @@ pub(crate) fn sane(uv: [f32; 2]) -> [f64; 2] {
 impl Charts {
     /// Finds the charts of `triangles` over vertices with these texture coordinates.
     pub fn find(texcoords: &[[f32; 2]], triangles: impl Iterator<Item = [u32; 3]>) -> Self {
-        let mut parent = vec![NO_CHART; texcoords.len()];
+        let mut connected = DisjointSet::new(texcoords.len());
+        let mut of_vertex = vec![NO_CHART; texcoords.len()];
         for [a, b, c] in triangles {
-            let root = join(&mut parent, a, b);
-            join(&mut parent, root, c);
+            connected.join(a, b);
+            connected.join(b, c);
+            for vertex in [a, b, c] {
+                of_vertex[vertex as usize] = 0;
+            }
         }
-        // A parent is never above its child, so one pass upwards meets roots first.
+        // Roots are the least of their sets, so each is numbered before the others.
         let mut boxes: Vec<UvBox> = Vec::new();
-        for vertex in 0..parent.len() {
-            let above = parent[vertex];
-            if above == NO_CHART {
+        for vertex in 0..of_vertex.len() {
+            if of_vertex[vertex] == NO_CHART {
                 continue;
             }
-            let chart = if above as usize == vertex {
+            let root = connected.root(vertex as u32) as usize;
+            of_vertex[vertex] = if root == vertex {
                 boxes.push(UvBox::EMPTY);
                 boxes.len() as u32 - 1
             } else {
-                parent[above as usize]
+                of_vertex[root]
             };
-            parent[vertex] = chart;
-            boxes[chart as usize].add(sane(texcoords[vertex]));
+            boxes[of_vertex[vertex] as usize].add(sane(texcoords[vertex]));
         }
-        Self { of_vertex: parent, boxes }
+        Self { of_vertex, boxes }
     }
-}
-
-/// Unites two vertices' sets and returns the common root, the lower of both.
-fn join(parent: &mut [u32], a: u32, b: u32) -> u32 {
-    let a = root(parent, a);
-    let b = root(parent, b);
-    let (low, high) = (a.min(b), a.max(b));
-    parent[high as usize] = low;
-    low
-}
-
-fn root(parent: &mut [u32], mut vertex: u32) -> u32 {
-    if parent[vertex as usize] == NO_CHART {
-        parent[vertex as usize] = vertex;
-        return vertex;
-    }
-    while parent[vertex as usize] != vertex {
-        let above = parent[parent[vertex as usize] as usize];
-        parent[vertex as usize] = above;
-        vertex = above;
-    }
-    vertex
 }
 
 #[cfg(test)]

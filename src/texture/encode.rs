@@ -1,4 +1,4 @@
-//! Encoding pictures: JPEG, or PNG where alpha is needed.
+//! Encoding images: JPEG, or PNG where alpha is needed.
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -9,7 +9,7 @@ use crate::{Error, Result};
 /// Largest side of a JPEG.
 pub(crate) const MAX_SIDE: usize = 65535;
 
-/// An encoded picture.
+/// An encoded image.
 pub(crate) struct Encoded {
     pub mime: &'static str,
     pub bytes: Vec<u8>,

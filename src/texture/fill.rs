@@ -3,7 +3,7 @@
 
 use super::bits::BitGrid;
 
-/// Texels in rows that may be part of a larger picture's.
+/// Texels in rows that may be part of a larger image's.
 pub(crate) struct Texels<'a> {
     pub pixels: &'a mut [u8],
     pub channels: usize,
@@ -198,9 +198,9 @@ mod tests {
 
     #[test]
     fn between_two_the_nearer_wins() {
-        for turned in [false, true] {
-            let at = |along: usize| if turned { (0, along) } else { (along, 0) };
-            let [width, height] = if turned { [1, 200] } else { [200, 1] };
+        for transposed in [false, true] {
+            let at = |along: usize| if transposed { (0, along) } else { (along, 0) };
+            let [width, height] = if transposed { [1, 200] } else { [200, 1] };
             let mut known = BitGrid::new(width, height);
             let mut pixels = vec![0u8; 600];
             for (along, color) in [(100, 50), (107, 90)] {
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_of_a_picture_leaves_the_rest_and_its_alpha_alone() {
+    fn a_part_of_an_image_leaves_the_rest_and_its_alpha_alone() {
         let mut pixels = [7, 7, 7, 1].repeat(8 * 8);
         let mut known = BitGrid::new(4, 4);
         known.set(0, 0);

@@ -1,10 +1,11 @@
-//! Islands: connected cells of a level picture that a node's triangles use.
+//! Islands: connected cells of a level image that a node's triangles use.
 //!
 //! Charts that lie side by side in the source become one island and keep their places relative to
 //! each other; so do charts that use the same texels, which are then stored once.
 
 use super::bits::BitGrid;
 use super::shape::Shape;
+use crate::mesh::DisjointSet;
 
 /// The islands of one cell grid.
 #[derive(Debug, Default)]
@@ -22,7 +23,7 @@ pub(crate) struct Islands {
 impl Islands {
     /// Finds the islands: cells that share an edge belong together.
     pub fn find(grid: &BitGrid) -> Self {
-        let mut parent: Vec<u32> = Vec::new();
+        let mut labels = DisjointSet::new(0);
         let mut runs: Vec<(u32, u32, u32)> = Vec::new();
         let mut rows = vec![0];
         let mut above = 0..0;
@@ -31,14 +32,13 @@ impl Islands {
             let mut candidate = above.start;
             for (start, end) in grid.runs(y) {
                 let (start, end) = (start as u32, end as u32);
-                let label = parent.len() as u32;
-                parent.push(label);
+                let label = labels.push();
                 while candidate < above.end && runs[candidate].1 <= start {
                     candidate += 1;
                 }
                 let mut touching = candidate;
                 while touching < above.end && runs[touching].0 < end {
-                    join(&mut parent, label, runs[touching].2);
+                    labels.join(label, runs[touching].2);
                     touching += 1;
                 }
                 runs.push((start, end, label));
@@ -47,17 +47,17 @@ impl Islands {
             rows.push(runs.len());
         }
         let mut result = Self { runs, rows, ..Self::default() };
-        result.collect(&mut parent);
+        result.collect(&mut labels);
         result
     }
 
     /// Numbers the islands in order of their first run and gathers their cells.
-    fn collect(&mut self, parent: &mut [u32]) {
-        let mut number = vec![u32::MAX; parent.len()];
+    fn collect(&mut self, labels: &mut DisjointSet) {
+        let mut number = vec![u32::MAX; labels.len()];
         let mut bounds: Vec<[u32; 4]> = Vec::new();
         for y in 0..self.rows.len() - 1 {
             for run in &mut self.runs[self.rows[y]..self.rows[y + 1]] {
-                let root = root(parent, run.2) as usize;
+                let root = labels.root(run.2) as usize;
                 if number[root] == u32::MAX {
                     number[root] = bounds.len() as u32;
                     bounds.push([run.0, y as u32, run.1, y as u32 + 1]);
@@ -92,28 +92,15 @@ impl Islands {
     }
 }
 
-fn join(parent: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (root(parent, a), root(parent, b));
-    parent[a.max(b) as usize] = a.min(b);
-}
-
-fn root(parent: &mut [u32], mut label: u32) -> u32 {
-    while parent[label as usize] != label {
-        parent[label as usize] = parent[parent[label as usize] as usize];
-        label = parent[label as usize];
-    }
-    label
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn arms_that_meet_below_are_one_island() {
-        let picture = ["1.1..", "1.1.1", "111..", "....."];
+        let image = ["1.1..", "1.1.1", "111..", "....."];
         let mut grid = BitGrid::new(5, 4);
-        for (y, row) in picture.iter().enumerate() {
+        for (y, row) in image.iter().enumerate() {
             for (x, _) in row.bytes().enumerate().filter(|(_, cell)| *cell == b'1') {
                 grid.set(x, y);
             }

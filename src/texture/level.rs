@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::bits::BitGrid;
 use super::fill::{self, Texels};
 use super::scale::{self, LinearImage, Rows, Weights};
-use super::srgb;
-use crate::import::Picture;
+use crate::color;
+use crate::decode::DecodedTexture;
 
 /// How far, in texels, used texels are extended into unused ones at every level: no block of a
 /// JPEG (16 a side, with half the colour resolution) that holds a used texel holds a foreign one,
@@ -16,7 +16,7 @@ const REACH: usize = 16;
 /// Which texels of a texture a block uses.
 #[derive(Debug)]
 pub(crate) struct Region {
-    /// First column and row; outside 0..size where charts cross the picture's border.
+    /// First column and row; outside 0..size where charts cross the image's border.
     pub origin: [i64; 2],
     /// Columns and rows, at least 1.
     pub size: [usize; 2],
@@ -26,7 +26,7 @@ pub(crate) struct Region {
 
 /// A region at one level's resolution.
 #[derive(Clone, Debug)]
-pub(crate) struct LevelPicture {
+pub(crate) struct LevelImage {
     /// Columns and rows.
     pub size: [usize; 2],
     /// 3 or 4.
@@ -39,31 +39,31 @@ pub(crate) struct LevelPicture {
 #[derive(Clone, Debug)]
 enum Pixels {
     /// The source's own, from this column and row on.
-    Source(Arc<Picture>, [usize; 2]),
+    Source(Arc<DecodedTexture>, [usize; 2]),
     Own(Vec<u8>),
 }
 
-impl LevelPicture {
+impl LevelImage {
     /// `start..start + count` of a row; the caller keeps to the size.
     pub fn row(&self, y: usize, start: usize, count: usize) -> &[u8] {
         let (pixels, width, x, y) = match &self.pixels {
-            Pixels::Source(picture, offset) => {
-                (&picture.pixels, picture.width as usize, start + offset[0], y + offset[1])
+            Pixels::Source(image, offset) => {
+                (&image.pixels, image.width as usize, start + offset[0], y + offset[1])
             }
             Pixels::Own(pixels) => (pixels, self.size[0], start, y),
         };
         &pixels[(y * width + x) * self.channels..][..count * self.channels]
     }
 
-    /// A picture of these bytes.
+    /// An image of these bytes.
     pub fn own(size: [usize; 2], channels: usize, step: f64, pixels: Vec<u8>) -> Self {
         Self { size, channels, step, pixels: Pixels::Own(pixels) }
     }
 
     /// The colour at a position in texels by bilinear sampling, linear light, 0–1; beyond the
-    /// picture its border texels go on.
+    /// image its border texels go on.
     pub fn light_at(&self, at: [f64; 2]) -> [f32; 3] {
-        let table = srgb::to_linear();
+        let table = color::byte_to_linear();
         let [x, y] = [0, 1].map(|axis| {
             let low = (at[axis] - 0.5).clamp(0.0, self.size[axis] as f64 - 1.0);
             let first = low as usize;
@@ -91,7 +91,7 @@ impl LevelPicture {
         let (size, pixels) = if self.channels == 3 && (ratio - 2.0).abs() < 1e-9 {
             (self.size.map(|side| side.div_ceil(2)), self.halved_rgb())
         } else {
-            let image = scale::area(&mut PictureRows { picture: self }, [ratio; 2]);
+            let image = scale::area(&mut ImageRows { image: self }, [ratio; 2]);
             ([image.width, image.height], bytes(&image, self.channels))
         };
         Self { size, channels: self.channels, step: self.step * ratio, pixels: Pixels::Own(pixels) }
@@ -99,7 +99,7 @@ impl LevelPicture {
 
     /// Means of two by two texels in linear light; where a side is odd, of what there is.
     fn halved_rgb(&self) -> Vec<u8> {
-        let (linear, byte) = (srgb::to_linear(), srgb::to_byte());
+        let (linear, byte) = (color::byte_to_linear(), color::linear_to_byte());
         let light = |value: u8| u32::from(linear[usize::from(value)]);
         let [width, height] = self.size;
         let columns = width.div_ceil(2);
@@ -127,7 +127,7 @@ impl LevelPicture {
         pixels
     }
 
-    /// Extends the used texels of a picture that is its own.
+    /// Extends the used texels of an image that is its own.
     fn extend(&mut self, used: &BitGrid) {
         if let Pixels::Own(pixels) = &mut self.pixels {
             let (channels, stride) = (self.channels, self.size[0]);
@@ -136,7 +136,7 @@ impl LevelPicture {
     }
 }
 
-/// The bytes of a scaled picture. Where nothing was opaque, colours come from around.
+/// The bytes of a scaled image. Where nothing was opaque, colours come from around.
 fn bytes(image: &LinearImage, channels: usize) -> Vec<u8> {
     let mut pixels = if channels == 4 { image.to_rgba8() } else { image.to_rgb8() };
     if !image.weight.is_empty() {
@@ -153,29 +153,29 @@ fn bytes(image: &LinearImage, channels: usize) -> Vec<u8> {
     pixels
 }
 
-/// Makes the pictures of all levels; `steps` are source texels per texel along each axis, the
+/// Makes the images of all levels; `steps` are source texels per texel along each axis, the
 /// finest (1) last.
 ///
 /// The finest is the source itself, each other one is scaled from the next finer. Unused texels
 /// near used ones take these's colours first, so that no mean mixes in a foreign one.
-pub(crate) fn level_pictures(
-    picture: Arc<Picture>,
+pub(crate) fn level_images(
+    image: Arc<DecodedTexture>,
     region: &Region,
     steps: &[f64],
-) -> Vec<LevelPicture> {
-    let source = source_level(picture, region);
+) -> Vec<LevelImage> {
+    let source = source_level(image, region);
     let mut used = region.covered.clone();
-    let mut coarser = |finer: &LevelPicture, step: f64| {
+    let mut coarser = |finer: &LevelImage, step: f64| {
         let ratio = step / finer.step;
         // Exact, whatever the products round to.
-        let mut level = LevelPicture { step, ..finer.reduced(ratio) };
+        let mut level = LevelImage { step, ..finer.reduced(ratio) };
         if let Some(used) = &mut used {
             *used = used.coarser(ratio, level.size[0], level.size[1]);
             level.extend(used);
         }
         level
     };
-    let mut levels: Vec<LevelPicture> = Vec::with_capacity(steps.len());
+    let mut levels: Vec<LevelImage> = Vec::with_capacity(steps.len());
     let mut steps = steps.iter().rev();
     match steps.next() {
         Some(finest) if *finest > source.step => levels.push(coarser(&source, *finest)),
@@ -192,34 +192,34 @@ pub(crate) fn level_pictures(
 }
 
 /// The region at full resolution: the source's texels as they are, unused ones near used ones
-/// replaced by their neighbours' colours. Nothing is copied where nobody else has the picture.
-fn source_level(mut picture: Arc<Picture>, region: &Region) -> LevelPicture {
-    let channels = usize::from(picture.channels);
+/// replaced by their neighbours' colours. Nothing is copied where nobody else has the image.
+fn source_level(mut image: Arc<DecodedTexture>, region: &Region) -> LevelImage {
+    let channels = usize::from(image.channels);
     let [width, height] = region.size;
-    let source = [picture.width as usize, picture.height as usize];
+    let source = [image.width as usize, image.height as usize];
     let inside = (0..2).all(|axis| {
         region.origin[axis] >= 0 && region.origin[axis] as usize + region.size[axis] <= source[axis]
     });
     let origin = region.origin.map(|start| start.max(0) as usize);
-    let level = |pixels| LevelPicture { size: region.size, channels, step: 1.0, pixels };
+    let level = |pixels| LevelImage { size: region.size, channels, step: 1.0, pixels };
     if inside {
         let Some(covered) = &region.covered else {
-            return level(Pixels::Source(picture, origin));
+            return level(Pixels::Source(image, origin));
         };
-        if let Some(own) = Arc::get_mut(&mut picture) {
+        if let Some(own) = Arc::get_mut(&mut image) {
             let pixels = &mut own.pixels[..];
             fill::extend(
                 &mut Texels { pixels, channels, stride: source[0], origin },
                 covered,
                 REACH,
             );
-            return level(Pixels::Source(picture, origin));
+            return level(Pixels::Source(image, origin));
         }
     }
     let mut pixels = Vec::with_capacity(width * height * channels);
     for y in 0..height {
         let row = (region.origin[1] + y as i64).rem_euclid(source[1] as i64) as usize;
-        let row = &picture.pixels[row * source[0] * channels..][..source[0] * channels];
+        let row = &image.pixels[row * source[0] * channels..][..source[0] * channels];
         let mut x = region.origin[0].rem_euclid(source[0] as i64) as usize;
         let mut left = width;
         while left > 0 {
@@ -236,24 +236,24 @@ fn source_level(mut picture: Arc<Picture>, region: &Region) -> LevelPicture {
     level
 }
 
-/// Rows of a level picture for the scaler.
-struct PictureRows<'a> {
-    picture: &'a LevelPicture,
+/// Rows of a level image for the scaler.
+struct ImageRows<'a> {
+    image: &'a LevelImage,
 }
 
-impl Rows for PictureRows<'_> {
+impl Rows for ImageRows<'_> {
     fn size(&self) -> [usize; 2] {
-        self.picture.size
+        self.image.size
     }
 
     fn weighted(&self) -> bool {
-        self.picture.channels == 4
+        self.image.channels == 4
     }
 
     fn read(&mut self, y: usize, rgb: &mut [u16], weight: &mut [u16]) -> Weights {
-        let table = srgb::to_linear();
-        let row = self.picture.row(y, 0, self.picture.size[0]);
-        if self.picture.channels == 3 {
+        let table = color::byte_to_linear();
+        let row = self.image.row(y, 0, self.image.size[0]);
+        if self.image.channels == 3 {
             for (value, byte) in rgb.iter_mut().zip(row) {
                 *value = table[usize::from(*byte)];
             }
@@ -273,23 +273,23 @@ impl Rows for PictureRows<'_> {
     }
 }
 
-/// A whole picture at another size, for repeating textures.
-pub(crate) fn resize_whole(picture: &Arc<Picture>, size: [usize; 2]) -> Picture {
-    let whole = [picture.width as usize, picture.height as usize];
-    let channels = usize::from(picture.channels);
-    let view = LevelPicture {
+/// A whole image at another size, for repeating textures.
+pub(crate) fn resize_whole(image: &Arc<DecodedTexture>, size: [usize; 2]) -> DecodedTexture {
+    let whole = [image.width as usize, image.height as usize];
+    let channels = usize::from(image.channels);
+    let view = LevelImage {
         size: whole,
         channels,
         step: 1.0,
-        pixels: Pixels::Source(Arc::clone(picture), [0, 0]),
+        pixels: Pixels::Source(Arc::clone(image), [0, 0]),
     };
     let step = [0, 1].map(|axis| whole[axis] as f64 / size[axis] as f64);
-    let image = scale::area(&mut PictureRows { picture: &view }, step);
-    Picture {
-        width: image.width as u32,
-        height: image.height as u32,
-        channels: picture.channels,
-        pixels: bytes(&image, channels),
+    let resized = scale::area(&mut ImageRows { image: &view }, step);
+    DecodedTexture {
+        width: resized.width as u32,
+        height: resized.height as u32,
+        channels: image.channels,
+        pixels: bytes(&resized, channels),
     }
 }
 
@@ -297,17 +297,17 @@ pub(crate) fn resize_whole(picture: &Arc<Picture>, size: [usize; 2]) -> Picture 
 mod tests {
     use super::*;
 
-    fn picture(width: usize, height: usize, channels: u8) -> Arc<Picture> {
+    fn image(width: usize, height: usize, channels: u8) -> Arc<DecodedTexture> {
         let pixels =
             (0..width * height * usize::from(channels)).map(|i| (i * 7 % 251) as u8).collect();
-        Arc::new(Picture { width: width as u32, height: height as u32, channels, pixels })
+        Arc::new(DecodedTexture { width: width as u32, height: height as u32, channels, pixels })
     }
 
     #[test]
     fn the_finest_level_is_the_source_itself() {
-        let source = picture(16, 9, 3);
+        let source = image(16, 9, 3);
         let region = Region { origin: [3, 2], size: [10, 5], covered: None };
-        let levels = level_pictures(Arc::clone(&source), &region, &[2.6, 1.3, 1.0]);
+        let levels = level_images(Arc::clone(&source), &region, &[2.6, 1.3, 1.0]);
         assert_eq!(levels[2].row(4, 1, 3), &source.pixels[(6 * 16 + 4) * 3..][..9]);
         assert_eq!(levels[1].size, [8, 4]);
         assert_eq!(levels[0].size, [4, 2]);
@@ -315,9 +315,9 @@ mod tests {
 
     #[test]
     fn a_region_over_the_border_wraps() {
-        let source = picture(16, 9, 3);
+        let source = image(16, 9, 3);
         let region = Region { origin: [-2, 7], size: [20, 4], covered: None };
-        let level = &level_pictures(Arc::clone(&source), &region, &[1.0])[0];
+        let level = &level_images(Arc::clone(&source), &region, &[1.0])[0];
         assert_eq!(level.row(0, 0, 1), &source.pixels[(7 * 16 + 14) * 3..][..3]);
         assert_eq!(level.row(2, 18, 1), &source.pixels[..3]);
     }
@@ -325,7 +325,7 @@ mod tests {
     #[test]
     fn black_background_does_not_reach_any_level() {
         let mut source =
-            Picture { width: 64, height: 64, channels: 3, pixels: vec![0; 64 * 64 * 3] };
+            DecodedTexture { width: 64, height: 64, channels: 3, pixels: vec![0; 64 * 64 * 3] };
         let mut covered = BitGrid::new(64, 64);
         for y in 0..64 {
             for x in 0..64 {
@@ -337,7 +337,7 @@ mod tests {
         }
         let region = Region { origin: [0; 2], size: [64; 2], covered: Some(covered) };
         for steps in [[12.0, 6.0, 3.0, 1.5, 1.0], [16.0, 8.0, 4.0, 2.0, 1.0]] {
-            for level in &level_pictures(Arc::new(source.clone()), &region, &steps) {
+            for level in &level_images(Arc::new(source.clone()), &region, &steps) {
                 for y in 0..level.size[1] {
                     for (x, texel) in level.row(y, 0, level.size[0]).chunks(3).enumerate() {
                         // Sixteen texels along one axis are as many or more on the diagonal.
@@ -352,15 +352,15 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_that_others_have_too_stays_as_it_is() {
-        let shared = picture(16, 9, 3);
+    fn a_image_that_others_have_too_stays_as_it_is() {
+        let shared = image(16, 9, 3);
         let mut covered = BitGrid::new(16, 9);
         covered.set(8, 4);
         let region = Region { origin: [0; 2], size: [16, 9], covered: Some(covered) };
         let before = shared.pixels.clone();
-        let of_shared = level_pictures(Arc::clone(&shared), &region, &[2.0, 1.0]);
+        let of_shared = level_images(Arc::clone(&shared), &region, &[2.0, 1.0]);
         assert_eq!(shared.pixels, before);
-        let of_own = level_pictures(shared, &region, &[2.0, 1.0]);
+        let of_own = level_images(shared, &region, &[2.0, 1.0]);
         for (a, b) in of_shared.iter().zip(&of_own) {
             assert!((0..a.size[1]).all(|y| a.row(y, 0, a.size[0]) == b.row(y, 0, b.size[0])));
             assert_eq!(a.row(0, 0, 1), a.row(a.size[1] - 1, a.size[0] - 1, 1));
@@ -371,32 +371,32 @@ mod tests {
     fn halves_are_means_in_linear_light_and_odd_sides_average_what_there_is() {
         let checker = (0..48).flat_map(|i| [if (i % 8 + i / 8) % 2 == 0 { 255 } else { 0 }; 3]);
         let [width, height] = [8, 6];
-        let source = Picture { width, height, channels: 3, pixels: checker.collect() };
+        let source = DecodedTexture { width, height, channels: 3, pixels: checker.collect() };
         let region = Region { origin: [0; 2], size: [8, 6], covered: None };
-        let level = &level_pictures(Arc::new(source), &region, &[2.0])[0];
+        let level = &level_images(Arc::new(source), &region, &[2.0])[0];
         assert!((0..3).all(|y| level.row(y, 0, 4).iter().all(|byte| *byte == 188)));
 
         let pixels = [[0; 3], [255; 3], [9; 3]].concat();
-        let odd = Picture { width: 3, height: 1, channels: 3, pixels };
+        let odd = DecodedTexture { width: 3, height: 1, channels: 3, pixels };
         let region = Region { origin: [0; 2], size: [3, 1], covered: None };
-        let level = &level_pictures(Arc::new(odd), &region, &[2.0, 1.0])[0];
+        let level = &level_images(Arc::new(odd), &region, &[2.0, 1.0])[0];
         assert_eq!((level.size, level.row(0, 0, 2)), ([2, 1], &[188, 188, 188, 9, 9, 9][..]));
     }
 
     #[test]
     fn transparent_texels_give_no_colour() {
         let pixels = [[200, 100, 50, 255], [0, 0, 0, 0]].concat().repeat(32);
-        let source = Arc::new(Picture { width: 8, height: 8, channels: 4, pixels });
+        let source = Arc::new(DecodedTexture { width: 8, height: 8, channels: 4, pixels });
         let region = Region { origin: [0; 2], size: [8; 2], covered: None };
-        let level = &level_pictures(source, &region, &[2.0])[0];
+        let level = &level_images(source, &region, &[2.0])[0];
         assert!(level.row(1, 0, 4).chunks(4).all(|texel| texel[0].abs_diff(200) <= 1
             && texel[2].abs_diff(50) <= 1
             && texel[3].abs_diff(128) <= 1));
     }
 
     #[test]
-    fn whole_pictures_get_exactly_the_size_asked_for() {
-        let resized = resize_whole(&picture(75, 50, 3), [37, 25]);
+    fn whole_images_get_exactly_the_size_asked_for() {
+        let resized = resize_whole(&image(75, 50, 3), [37, 25]);
         assert_eq!((resized.width, resized.height), (37, 25));
         assert_eq!(resized.pixels.len(), 37 * 25 * 3);
     }

@@ -2,13 +2,13 @@
 //! and no others.
 //!
 //! [`TexturePlan`] decides for each texture of an input whether it is cut up or, as it repeats,
-//! kept whole. [`TextureCache`] decodes each picture once. [`BlockTextures`] scales what a block
+//! kept whole. [`TextureCache`] decodes each image once. [`BlockTextures`] scales what a block
 //! uses for every level, in linear light and without mixing in texels that nothing uses; its
 //! [`node_mesh`](BlockTextures::node_mesh) copies what a node uses into an atlas of its own.
 //! [`SharedTextures`] keeps the repeating ones, once for each resolution.
 //!
-//! Texel `(x, y)` covers `x..x + 1`, `y..y + 1` of a picture; a texture coordinate times the
-//! picture's size is a position in it. Bilinear filtering at a position reads the texels whose
+//! Texel `(x, y)` covers `x..x + 1`, `y..y + 1` of an image; a texture coordinate times the
+//! image's size is a position in it. Bilinear filtering at a position reads the texels whose
 //! centre is less than one texel away.
 
 mod atlas;
@@ -24,23 +24,21 @@ mod level;
 mod node;
 mod open_page;
 mod pack;
+mod packing;
 mod plan;
 mod primitives;
 mod raster;
-mod ring;
 mod scale;
 mod shape;
 mod shared;
 mod split;
-pub(crate) mod srgb;
-#[cfg(test)]
-mod survey;
 #[cfg(test)]
 mod tests;
+mod wrapped_page;
 
 pub use bake::{BakeClasses, BakePlan, BakeReason, BakedMesh, Seams};
 pub use block::{BlockTextures, TextureOptions, texture_factors};
 pub use cache::TextureCache;
-pub use node::TexturedNode;
+pub use node::{AppendedSkirts, TexturedNode};
 pub use plan::{TexturePlan, TextureUse};
 pub use shared::{SharedFile, SharedTextures};

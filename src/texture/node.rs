@@ -5,12 +5,12 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use super::atlas::{Atlas, Page, PatchPlace, Sheet, SheetPicture};
+use super::atlas::{Atlas, Page, PatchPlacement, Sheet, SheetImage};
 use super::bake::BakedMesh;
 use super::block::{BlockTextures, Prepared};
 use super::charts::{self, Charts, NO_CHART, UvBox};
 use super::encode;
-use super::level::LevelPicture;
+use super::level::LevelImage;
 use crate::format::{NodeImage, NodeImageData, NodeMesh};
 use crate::mesh::{Mesh, Warnings, Wrap};
 use crate::{Error, Result};
@@ -34,19 +34,29 @@ const MAX_SHARE: f64 = 4.0;
 /// Atlases with fewer texels than this are left as they are.
 const SMALL: usize = 64 * 64;
 
+/// The skirts at the end of a node's mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AppendedSkirts {
+    /// How many of the last triangles they are.
+    pub triangles: usize,
+    /// Pairs of vertices that belong to one chart though no triangle joins them: a border vertex
+    /// and the corner of a skirt that looks like it.
+    pub alike: Vec<[u32; 2]>,
+}
+
 /// A node ready to be written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TexturedNode {
-    /// Geometry and pictures.
+    /// Geometry and images.
     pub mesh: NodeMesh,
-    /// Texels of the pictures that are the node's own.
+    /// Texels of the images that are the node's own.
     pub own_texels: u64,
     /// What could not be done as asked.
     pub warnings: Warnings,
 }
 
-/// From a chart's texture coordinates to a position in its level picture:
-/// `clamp(uv · scale − offset)`, clamped to the picture where it has a limit.
+/// From a chart's texture coordinates to a position in its level image:
+/// `clamp(uv · scale − offset)`, clamped to the image where it has a limit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mapping {
     scale: [f64; 2],
@@ -68,55 +78,53 @@ impl Mapping {
     }
 }
 
-/// From a position in a level picture to a texture coordinate of an image.
+/// From a position in a level image to a texture coordinate of an image.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct ImagePlacement {
     pub(super) image: usize,
-    patch: PatchPlace,
+    patch: PatchPlacement,
     unit: [f64; 2],
 }
 
-impl Place {
+impl ImagePlacement {
     pub(super) fn texcoord(&self, texel: [f64; 2]) -> [f32; 2] {
         let texel = self.patch.texel(texel);
         [0, 1].map(|axis| (texel[axis] * self.unit[axis]) as f32)
     }
 }
 
-/// The place of triangles without texture.
-const NO_PLACE: u32 = u32::MAX;
+/// The placement of triangles without texture.
+const NO_PLACEMENT: u32 = u32::MAX;
 
-/// The texture of charts that have a picture of their own.
+/// The texture of charts that have an image of their own.
 const NO_TEXTURE: u32 = u32::MAX;
 
 impl BlockTextures<'_> {
-    /// The node of a simplified (or original) piece of the block at `level`, 0 being the root's.
+    /// The node of a simplified (or original) part of the block at `level`, 0 being the root's.
     ///
-    /// `origin` is the block's, in source coordinates. `alike` are pairs of vertices that belong
-    /// to one chart though no triangle joins them, such as a skirt's corner and the border vertex
-    /// that it copies. Whatever the mesh names that the model
-    /// does not have is drawn plain.
+    /// `origin` is the block's, in source coordinates. Whatever the mesh names that the model does
+    /// not have is drawn plain.
     pub fn node_mesh(
         &self,
         mesh: &Mesh,
-        alike: &[[u32; 2]],
+        skirts: &AppendedSkirts,
         level: usize,
         origin: [f64; 3],
     ) -> Result<TexturedNode> {
-        self.textured(NodeBuilder::new(self, mesh, self.nearest_level(level)), alike, origin)
+        self.textured(NodeBuilder::new(self, mesh, self.nearest_level(level)), skirts, origin)
     }
 
     /// The same of a baked mesh.
     pub fn baked_node_mesh(
         &self,
         baked: &BakedMesh,
-        alike: &[[u32; 2]],
+        skirts: &AppendedSkirts,
         level: usize,
         origin: [f64; 3],
     ) -> Result<TexturedNode> {
         let mut node = NodeBuilder::new(self, &baked.mesh, self.nearest_level(level));
         node.baked = Some(baked);
-        self.textured(node, alike, origin)
+        self.textured(node, skirts, origin)
     }
 
     pub(super) fn nearest_level(&self, level: usize) -> usize {
@@ -136,9 +144,11 @@ impl BlockTextures<'_> {
     fn textured(
         &self,
         mut node: NodeBuilder,
-        alike: &[[u32; 2]],
+        skirts: &AppendedSkirts,
         origin: [f64; 3],
     ) -> Result<TexturedNode> {
+        node.skirt_triangles = skirts.triangles;
+        let alike = &skirts.alike[..];
         node.find_charts(alike);
         for channels in [3, 4] {
             node.build_atlas(channels)?;
@@ -163,14 +173,16 @@ pub(super) struct NodeBuilder<'a> {
     /// Where it is, the triangles of its charts take their texels from it.
     baked: Option<&'a BakedMesh>,
     pub(super) level: usize,
+    /// The last so many triangles of the mesh are skirts.
+    pub(super) skirt_triangles: usize,
     pub(super) charts: Charts,
     /// By chart.
     pub(super) chart_textures: Vec<u32>,
-    /// By chart; `None` until its picture is made.
+    /// By chart; `None` until its image is made.
     pub(super) mappings: Vec<Option<Mapping>>,
-    /// By triangle: index into `places`, or [`NO_PLACE`].
-    pub(super) place_of: Vec<u32>,
-    pub(super) places: Vec<Place>,
+    /// By triangle: index into `placements`, or [`NO_PLACEMENT`].
+    pub(super) placement_of: Vec<u32>,
+    pub(super) placements: Vec<ImagePlacement>,
     pub(super) images: Vec<NodeImage>,
     /// Atlases whose opposite sides meet.
     pub(super) wrapping: Vec<usize>,
@@ -184,18 +196,19 @@ impl<'a> NodeBuilder<'a> {
             mesh,
             baked: None,
             level,
+            skirt_triangles: 0,
             charts: Charts::default(),
             chart_textures: Vec::new(),
             mappings: Vec::new(),
-            place_of: vec![NO_PLACE; mesh.triangles.len()],
-            places: Vec::new(),
+            placement_of: vec![NO_PLACEMENT; mesh.triangles.len()],
+            placements: Vec::new(),
             images: Vec::new(),
             wrapping: Vec::new(),
             warnings: Warnings::default(),
         }
     }
 
-    /// The texture of a material, where there is a picture for it.
+    /// The texture of a material, where there is an image for it.
     fn texture_of(&self, material: u32) -> Option<u32> {
         let texture = self.block.material_textures.get(material as usize).copied().flatten()?;
         match self.block.textures.get(texture as usize)? {
@@ -244,7 +257,7 @@ impl<'a> NodeBuilder<'a> {
 
     /// Makes the atlas of the charts that a baked mesh has of its own.
     fn add_baked(&mut self, alike: &[[u32; 2]]) -> Result<()> {
-        let Some(baked) = self.baked.filter(|baked| !baked.pictures.is_empty()) else {
+        let Some(baked) = self.baked.filter(|baked| !baked.images.is_empty()) else {
             return Ok(());
         };
         let first = self.charts.boxes.len() as u32;
@@ -258,44 +271,43 @@ impl<'a> NodeBuilder<'a> {
         for &[model, copy] in alike {
             self.charts.of_vertex[copy as usize] = self.charts.of_vertex[model as usize];
         }
-        self.charts.boxes.resize(first as usize + baked.pictures.len(), UvBox::EMPTY);
+        self.charts.boxes.resize(first as usize + baked.images.len(), UvBox::EMPTY);
         self.chart_textures.resize(self.charts.boxes.len(), NO_TEXTURE);
         self.mappings.resize(self.charts.boxes.len(), None);
-        let mut pictures: Vec<Cow<LevelPicture>> =
-            baked.pictures.iter().map(Cow::Borrowed).collect();
+        let mut images: Vec<Cow<LevelImage>> = baked.images.iter().map(Cow::Borrowed).collect();
         let mut mapping = Mapping::TEXELS;
         loop {
-            let (sheet_pictures, members) = self.baked_pictures(first, &pictures, mapping);
+            let (sheet_images, members) = self.baked_images(first, &images, mapping);
             let cell = self.block.baked_cell(self.level);
-            let sheet = Sheet { pictures: sheet_pictures, cell, max_side: self.max_side() };
+            let sheet = Sheet { images: sheet_images, cell, max_side: self.max_side() };
             if let Some(atlas) = sheet.build(1) {
                 let mut mappings = vec![None; first as usize];
                 mappings.resize(self.charts.boxes.len(), Some(mapping));
                 return self.take_atlas(&atlas, &mappings, &members, 3);
             }
-            if pictures.iter().all(|picture| picture.size == [1, 1]) {
+            if images.iter().all(|image| image.size == [1, 1]) {
                 let side = self.max_side();
                 return Err(Error::Internal(format!("no atlas of {side} texels a side")));
             }
-            pictures = pictures.iter().map(|picture| Cow::Owned(picture.halved())).collect();
+            images = images.iter().map(|image| Cow::Owned(image.halved())).collect();
             mapping.scale = mapping.scale.map(|scale| scale * 0.5);
         }
     }
 
-    /// The charts from `first` on as a sheet's pictures, and which triangles of the mesh those are.
-    fn baked_pictures<'p>(
+    /// The charts from `first` on as a sheet's images, and which triangles of the mesh those are.
+    fn baked_images<'p>(
         &self,
         first: u32,
-        pictures: &'p [Cow<LevelPicture>],
+        images: &'p [Cow<LevelImage>],
         mapping: Mapping,
-    ) -> (Vec<SheetPicture<'p>>, Vec<Vec<u32>>) {
-        let empty = |picture: &'p Cow<LevelPicture>| SheetPicture {
-            picture,
+    ) -> (Vec<SheetImage<'p>>, Vec<Vec<u32>>) {
+        let empty = |image: &'p Cow<LevelImage>| SheetImage {
+            image,
             corners: Vec::new(),
             charts: Vec::new(),
         };
-        let mut lists: Vec<SheetPicture> = pictures.iter().map(empty).collect();
-        let mut members = vec![Vec::new(); pictures.len()];
+        let mut lists: Vec<SheetImage> = images.iter().map(empty).collect();
+        let mut members = vec![Vec::new(); images.len()];
         for (index, triangle) in self.mesh.triangles.iter().enumerate() {
             let chart =
                 self.chart_of(*triangle).and_then(|chart| chart.checked_sub(first as usize));
@@ -310,51 +322,49 @@ impl<'a> NodeBuilder<'a> {
 
     /// Makes the atlas of all cut-up textures with this many channels.
     fn build_atlas(&mut self, channels: usize) -> Result<()> {
-        // By texture: its place among the sheet's pictures.
-        let mut pictures: BTreeMap<u32, usize> = BTreeMap::new();
+        // By texture: its index among the sheet's images.
+        let mut images: BTreeMap<u32, usize> = BTreeMap::new();
         for texture in &self.chart_textures {
             if let Some(Prepared::Atlas(source)) = self.block.textures.get(*texture as usize)
                 && source.channels == channels
             {
-                pictures.insert(*texture, 0);
+                images.insert(*texture, 0);
             }
         }
-        if pictures.is_empty() {
+        if images.is_empty() {
             return Ok(());
         }
-        for (place, index) in pictures.values_mut().enumerate() {
-            *index = place;
+        for (number, index) in images.values_mut().enumerate() {
+            *index = number;
         }
         let is_leaf = self.block.steps[self.level] <= 1.0;
         let max_side = self.max_side();
-        let mut coarser: Vec<Cow<'a, LevelPicture>> = Vec::new();
+        let mut coarser: Vec<Cow<'a, LevelImage>> = Vec::new();
         let mut halvings = 0;
         let mut fitted = false;
         loop {
-            let levels: Vec<&LevelPicture> = if halvings == 0 && !fitted {
-                pictures.keys().filter_map(|texture| self.level_picture(*texture)).collect()
+            let levels: Vec<&LevelImage> = if halvings == 0 && !fitted {
+                images.keys().filter_map(|texture| self.level_image(*texture)).collect()
             } else {
-                coarser.iter().map(|picture| &**picture).collect()
+                coarser.iter().map(|image| &**image).collect()
             };
-            let mappings = self.texel_mappings(&pictures, &levels);
-            let (sheet_pictures, members) = self.sheet_pictures(&pictures, &levels, &mappings);
-            let sheet =
-                Sheet { pictures: sheet_pictures, cell: self.block.cell(self.level), max_side };
+            let mappings = self.texel_mappings(&images, &levels);
+            let (sheet_images, members) = self.sheet_images(&images, &levels, &mappings);
+            let sheet = Sheet { images: sheet_images, cell: self.block.cell(self.level), max_side };
             let max_pages = if is_leaf && halvings == 0 { usize::MAX } else { 1 };
             if let Some(atlas) = sheet.build(max_pages) {
                 if !is_leaf && !fitted && halvings == 0 && self.exceeds_share(&atlas) {
                     fitted = true;
-                    coarser =
-                        pictures.keys().filter_map(|texture| self.coarser(*texture)).collect();
+                    coarser = images.keys().filter_map(|texture| self.coarser(*texture)).collect();
                     continue;
                 }
                 self.take_atlas(&atlas, &mappings, &members, channels)?;
                 break;
             }
-            if levels.iter().all(|picture| picture.size == [1, 1]) {
+            if levels.iter().all(|image| image.size == [1, 1]) {
                 return Err(Error::Internal(format!("no atlas of {max_side} texels a side")));
             }
-            coarser = levels.iter().map(|picture| Cow::Owned(picture.halved())).collect();
+            coarser = levels.iter().map(|image| Cow::Owned(image.halved())).collect();
             halvings += 1;
         }
         if halvings > 0 {
@@ -383,7 +393,7 @@ impl<'a> NodeBuilder<'a> {
     }
 
     /// A texture at the level above, or at half the resolution where there is none.
-    fn coarser(&self, texture: u32) -> Option<Cow<'a, LevelPicture>> {
+    fn coarser(&self, texture: u32) -> Option<Cow<'a, LevelImage>> {
         let Prepared::Atlas(source) = &self.block.textures[texture as usize] else { return None };
         match self.level.checked_sub(1) {
             Some(above) => source.levels.get(above).map(Cow::Borrowed),
@@ -391,21 +401,21 @@ impl<'a> NodeBuilder<'a> {
         }
     }
 
-    fn level_picture(&self, texture: u32) -> Option<&'a LevelPicture> {
+    fn level_image(&self, texture: u32) -> Option<&'a LevelImage> {
         match &self.block.textures[texture as usize] {
             Prepared::Atlas(source) => source.levels.get(self.level),
             _ => None,
         }
     }
 
-    /// By chart: from texture coordinates to texels of these level pictures.
+    /// By chart: from texture coordinates to texels of these level images.
     fn texel_mappings(
         &self,
-        pictures: &BTreeMap<u32, usize>,
-        levels: &[&LevelPicture],
+        images: &BTreeMap<u32, usize>,
+        levels: &[&LevelImage],
     ) -> Vec<Option<Mapping>> {
         let mapping = |(bounds, texture): (&charts::UvBox, &u32)| {
-            let level = levels.get(*pictures.get(texture)?)?;
+            let level = levels.get(*images.get(texture)?)?;
             let Prepared::Atlas(source) = &self.block.textures[*texture as usize] else {
                 return None;
             };
@@ -421,29 +431,26 @@ impl<'a> NodeBuilder<'a> {
         self.charts.boxes.iter().zip(&self.chart_textures).map(mapping).collect()
     }
 
-    /// The sheet's pictures with their triangles, and which triangles of the mesh those are.
-    fn sheet_pictures<'p>(
+    /// The sheet's images with their triangles, and which triangles of the mesh those are.
+    fn sheet_images<'p>(
         &self,
-        pictures: &BTreeMap<u32, usize>,
-        levels: &[&'p LevelPicture],
+        images: &BTreeMap<u32, usize>,
+        levels: &[&'p LevelImage],
         mappings: &[Option<Mapping>],
-    ) -> (Vec<SheetPicture<'p>>, Vec<Vec<u32>>) {
+    ) -> (Vec<SheetImage<'p>>, Vec<Vec<u32>>) {
         let mut members = vec![Vec::new(); levels.len()];
-        let empty = |picture: &&'p LevelPicture| SheetPicture {
-            picture,
-            corners: Vec::new(),
-            charts: Vec::new(),
-        };
-        let mut lists: Vec<SheetPicture> = levels.iter().map(empty).collect();
+        let empty =
+            |image: &&'p LevelImage| SheetImage { image, corners: Vec::new(), charts: Vec::new() };
+        let mut lists: Vec<SheetImage> = levels.iter().map(empty).collect();
         for (index, triangle) in self.mesh.triangles.iter().enumerate() {
             let Some(chart) = self.chart_of(*triangle) else { continue };
             let Some(mapping) = &mappings[chart] else { continue };
-            let Some(picture) = pictures.get(&self.chart_textures[chart]) else { continue };
-            let list = &mut lists[*picture];
+            let Some(image) = images.get(&self.chart_textures[chart]) else { continue };
+            let list = &mut lists[*image];
             let texel = |vertex: u32| mapping.texel(self.mesh.texcoords[vertex as usize]);
             list.corners.push(triangle.map(texel));
             list.charts.push(chart as u32);
-            members[*picture].push(index as u32);
+            members[*image].push(index as u32);
         }
         (lists, members)
     }
@@ -457,15 +464,15 @@ impl<'a> NodeBuilder<'a> {
         channels: usize,
     ) -> Result<()> {
         let first_image = self.images.len();
-        let first_place = self.places.len() as u32;
-        self.places.extend(atlas.places.iter().map(|place| Place {
-            image: first_image + place.page,
-            patch: *place,
-            unit: atlas.pages[place.page].size.map(|side| 1.0 / side as f64),
+        let first_placement = self.placements.len() as u32;
+        self.placements.extend(atlas.placements.iter().map(|patch| ImagePlacement {
+            image: first_image + patch.page,
+            patch: *patch,
+            unit: atlas.pages[patch.page].size.map(|side| 1.0 / side as f64),
         }));
         for (members, patches) in members.iter().zip(&atlas.patches) {
             for (triangle, patch) in members.iter().zip(patches) {
-                self.place_of[*triangle as usize] = first_place + patch;
+                self.placement_of[*triangle as usize] = first_placement + patch;
             }
         }
         for (own, mapping) in self.mappings.iter_mut().zip(mappings) {
@@ -491,10 +498,10 @@ impl<'a> NodeBuilder<'a> {
         })
     }
 
-    /// Finds the shared pictures of the charts that repeat.
+    /// Finds the shared images of the charts that repeat.
     fn find_shared(&mut self) -> Result<()> {
         // By material, as the wrapping is the material's.
-        let mut places: BTreeMap<u32, u32> = BTreeMap::new();
+        let mut placements: BTreeMap<u32, u32> = BTreeMap::new();
         let mut images: BTreeMap<u32, usize> = BTreeMap::new();
         for (index, triangle) in self.mesh.triangles.iter().enumerate() {
             let Some(chart) = self.chart_of(*triangle) else { continue };
@@ -504,8 +511,8 @@ impl<'a> NodeBuilder<'a> {
                 continue;
             };
             let material = self.mesh.triangle_material(*triangle);
-            let place = match places.get(&material) {
-                Some(place) => *place,
+            let placement = match placements.get(&material) {
+                Some(placement) => *placement,
                 None => {
                     let image = match images.get(&texture) {
                         Some(image) => *image,
@@ -520,12 +527,16 @@ impl<'a> NodeBuilder<'a> {
                             self.images.len() - 1
                         }
                     };
-                    self.places.push(Place { image, patch: PatchPlace::default(), unit: [1.0; 2] });
-                    places.insert(material, self.places.len() as u32 - 1);
-                    self.places.len() as u32 - 1
+                    self.placements.push(ImagePlacement {
+                        image,
+                        patch: PatchPlacement::default(),
+                        unit: [1.0; 2],
+                    });
+                    placements.insert(material, self.placements.len() as u32 - 1);
+                    self.placements.len() as u32 - 1
                 }
             };
-            self.place_of[index] = place;
+            self.placement_of[index] = placement;
             if self.mappings[chart].is_none() {
                 self.mappings[chart] = Some(self.repeating_mapping(chart, material));
             }

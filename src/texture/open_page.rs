@@ -1,10 +1,10 @@
-//! Packing onto pages whose sides do not meet: what is too long for a ring, or too much for one
-//! page.
+//! Packing onto pages whose sides do not meet: what is too long for a wrapped page, or too much
+//! for one.
 //!
-//! Shapes are placed largest first at the lowest, then leftmost place where they fit (as xatlas
-//! does by brute force); all places of a row are tried at once, 64 to a machine word.
+//! Shapes are placed largest first at the lowest, then leftmost position where they fit (as xatlas
+//! does by brute force); all positions of a row are tried at once, 64 to a machine word.
 
-use super::pack::{Packing, Placement};
+use super::packing::{Packing, Placement};
 use super::shape::Shape;
 
 /// Widths that are tried for one page, relative to the side of a square of the shapes' area.
@@ -31,7 +31,7 @@ fn one_page(shapes: &[Shape], order: &[usize], width: usize, height: usize) -> O
     let mut placements = vec![Placement::default(); shapes.len()];
     for index in order {
         let (x, y) = page.place(&shapes[*index], height)?;
-        placements[*index] = Placement { page: 0, x, y, turned: false };
+        placements[*index] = Placement { page: 0, x, y, transposed: false };
     }
     Some(Packing { placements, pages: vec![page.used], wraps: false })
 }
@@ -55,7 +55,7 @@ fn many_pages(shapes: &[Shape], order: &[usize], max: usize) -> Option<Packing> 
                 (pages.len() - 1, place)
             }
         };
-        placements[*index] = Placement { page: number, x, y, turned: false };
+        placements[*index] = Placement { page: number, x, y, transposed: false };
     }
     Some(Packing {
         placements,
@@ -105,7 +105,7 @@ impl Page {
         }
     }
 
-    /// Puts the shape at its lowest, then leftmost place; `None` where it would end below `max`
+    /// Puts the shape at its lowest, then leftmost position; `None` where it would end below `max`
     /// rows.
     fn place(&mut self, shape: &Shape, max: usize) -> Option<(usize, usize)> {
         if shape.size[0] > self.width {

@@ -1,40 +1,13 @@
 //! Packing shapes of cells into rectangles, by shape rather than by bounding box.
 //!
-//! Shapes are placed largest first at the lowest, then leftmost place where they fit, upright or
-//! turned, on a page whose opposite sides meet ([`Ring`]). Widths are tried around the square's;
-//! each is given the height with which it would beat the best page so far.
+//! Shapes are placed largest first at the lowest, then leftmost position where they fit, upright or
+//! transposed, on a page whose opposite sides meet ([`WrappedPage`]). Widths are tried around the
+//! square's; each is given the height with which it would beat the best page so far.
 
 use super::open_page;
-use super::ring::{self, Piece, Ring};
+use super::packing::{Packing, Placement};
 use super::shape::Shape;
-
-/// Where a shape's bounding box lies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Placement {
-    pub page: usize,
-    pub x: usize,
-    pub y: usize,
-    /// True where the shape's columns became rows.
-    pub turned: bool,
-}
-
-/// Where all shapes lie.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Packing {
-    /// In the order of the shapes.
-    pub placements: Vec<Placement>,
-    /// Columns and rows of each page.
-    pub pages: Vec<[usize; 2]>,
-    /// True where shapes leave the only page on one side and come back on the other.
-    pub wraps: bool,
-}
-
-impl Packing {
-    /// Cells of all pages.
-    pub fn area(&self) -> usize {
-        self.pages.iter().map(|[width, height]| width * height).sum()
-    }
-}
+use super::wrapped_page::{MAX_COLUMNS, PageShape, WrappedPage};
 
 /// Pages whose square is wider than this are packed on a coarser grid.
 const WIDEST_SQUARE: usize = 96;
@@ -65,7 +38,7 @@ pub(crate) fn pack(shapes: &[&Shape], max: usize, multiple: usize) -> Option<Pac
     let side = (area as f64).sqrt();
     let narrowest = shapes.iter().map(|shape| shape.size[0].min(shape.size[1])).max().unwrap_or(1);
     let mut factor = 1;
-    while side as usize > WIDEST_SQUARE * factor || narrowest > ring::MAX_COLUMNS * factor {
+    while side as usize > WIDEST_SQUARE * factor || narrowest > MAX_COLUMNS * factor {
         factor *= 2;
     }
     let coarse: Vec<Shape> = shapes.iter().map(|shape| shape.coarser(factor)).collect();
@@ -89,34 +62,16 @@ pub(crate) fn pack(shapes: &[&Shape], max: usize, multiple: usize) -> Option<Pac
     Some(packing)
 }
 
-impl Packing {
-    /// Finds out whether shapes go over the sides; where none does, pages end with their shapes.
-    fn trim(&mut self, shapes: &[&Shape]) {
-        let mut used = vec![[0; 2]; self.pages.len()];
-        for (placement, shape) in self.placements.iter().zip(shapes) {
-            let [mut width, mut height] = shape.size;
-            if placement.turned {
-                (width, height) = (height, width);
-            }
-            let used = &mut used[placement.page];
-            *used = [used[0].max(placement.x + width), used[1].max(placement.y + height)];
-        }
-        self.wraps =
-            used.iter().zip(&self.pages).any(|(used, page)| used[0] > page[0] || used[1] > page[1]);
-        if !self.wraps {
-            self.pages = used;
-        }
-    }
-}
-
 /// The smallest page that is found, of at most `max` cells a side and multiples of `multiple`.
 fn one_page(shapes: &[Shape], order: &[usize], max: usize, multiple: usize) -> Option<Packing> {
     let cells: usize = shapes.iter().map(Shape::area).sum();
-    let pieces: Vec<[Piece; 2]> =
-        shapes.iter().map(|shape| [Piece::new(shape), Piece::new(&shape.turned())]).collect();
+    let page_shapes: Vec<[PageShape; 2]> = shapes
+        .iter()
+        .map(|shape| [PageShape::new(shape), PageShape::new(&shape.transposed())])
+        .collect();
     let max = max / multiple;
     let side = (cells.max(1) as f64).sqrt() / multiple as f64;
-    let widest = max.min(ring::MAX_COLUMNS / multiple);
+    let widest = max.min(MAX_COLUMNS / multiple);
     let low = ((side / SPREAD) as usize).clamp(1, widest.max(1));
     let high = ((side * SPREAD) as usize + 1).min(widest);
     let count = (EFFORT / shapes.len().max(1)).max(LEAST_WIDTHS);
@@ -139,7 +94,7 @@ fn one_page(shapes: &[Shape], order: &[usize], max: usize, multiple: usize) -> O
         let mut height = if best.is_some() { most } else { most.min(least + least / 8) };
         let mut fails = least - 1;
         while fails < most && height >= least {
-            match place_all(&pieces, order, [width * multiple, height * multiple]) {
+            match place_all(&page_shapes, order, [width * multiple, height * multiple]) {
                 Some(placements) => {
                     best = Some(([width, height], placements));
                     most = height - 1;
@@ -158,25 +113,29 @@ fn one_page(shapes: &[Shape], order: &[usize], max: usize, multiple: usize) -> O
     Some(Packing { placements, pages: vec![size.map(|side| side * multiple)], wraps: true })
 }
 
-/// Places all pieces on one page of this size, or `None`.
-fn place_all(pieces: &[[Piece; 2]], order: &[usize], size: [usize; 2]) -> Option<Vec<Placement>> {
-    let mut ring = Ring::new(size[0], size[1]);
-    let mut placements = vec![Placement::default(); pieces.len()];
+/// Places all shapes on one page of this size, or `None`.
+fn place_all(
+    shapes: &[[PageShape; 2]],
+    order: &[usize],
+    size: [usize; 2],
+) -> Option<Vec<Placement>> {
+    let mut page = WrappedPage::new(size[0], size[1]);
+    let mut placements = vec![Placement::default(); shapes.len()];
     for (placed, index) in order.iter().enumerate() {
-        let [upright, turned] = &pieces[*index];
-        let first = ring.find(upright, size[1]);
-        let ends = first.map_or(usize::MAX, |place| place[1] + upright.size[1]);
+        let [upright, transposed] = &shapes[*index];
+        let first = page.find(upright, size[1]);
+        let ends = first.map_or(usize::MAX, |at| at[1] + upright.size[1]);
         // Turned where it then ends further up.
-        let second = ring.find(turned, ends.saturating_sub(turned.size[1]).min(size[1]));
-        let (place, turned) = match (first, second) {
-            (_, Some(place)) => (place, true),
-            (Some(place), None) => (place, false),
+        let second = page.find(transposed, ends.saturating_sub(transposed.size[1]).min(size[1]));
+        let (at, transposed) = match (first, second) {
+            (_, Some(at)) => (at, true),
+            (Some(at), None) => (at, false),
             (None, None) => return None,
         };
         if placed + 1 < order.len() {
-            ring.put(&pieces[*index][usize::from(turned)], place);
+            page.put(&shapes[*index][usize::from(transposed)], at);
         }
-        placements[*index] = Placement { page: 0, x: place[0], y: place[1], turned };
+        placements[*index] = Placement { page: 0, x: at[0], y: at[1], transposed };
     }
     Some(placements)
 }
@@ -184,6 +143,7 @@ fn place_all(pieces: &[[Piece; 2]], order: &[usize], size: [usize; 2]) -> Option
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     fn block(width: usize, height: usize) -> Shape {
         Shape {
@@ -215,7 +175,7 @@ mod tests {
             let [width, height] = packing.pages[placement.page];
             for [row, start, end] in &shape.runs {
                 for x in *start..*end {
-                    let (x, y) = if placement.turned { (*row, x) } else { (x, *row) };
+                    let (x, y) = if placement.transposed { (*row, x) } else { (x, *row) };
                     let x = on_page(placement.x + x as usize, width);
                     let y = on_page(placement.y + y as usize, height);
                     let cell = &mut pages[placement.page][y * width + x];
@@ -228,16 +188,12 @@ mod tests {
 
     #[test]
     fn many_shapes_never_overlap() {
-        let mut seed = 1u32;
-        let mut random = |below: u32| {
-            seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
-            (seed >> 16) % below
-        };
+        let mut random = Random::new(1, 0);
         for round in 0..30 {
-            let shapes: Vec<Shape> = (0..1 + random(80))
-                .map(|_| match random(2) {
-                    0 => block(1 + random(40) as usize, 1 + random(90) as usize),
-                    _ => corner(2 + random(70)),
+            let shapes: Vec<Shape> = (0..1 + random.below(80))
+                .map(|_| match random.below(2) {
+                    0 => block(1 + random.below(40), 1 + random.below(90)),
+                    _ => corner(2 + random.below(70) as u32),
                 })
                 .collect();
             let max = if round % 2 == 0 { 4096 } else { 100 };

@@ -15,7 +15,7 @@ pub enum TextureUse {
 }
 
 /// A texture whose triangles' areas in texture space sum up to more than this many times the
-/// picture is shared: copies of its texels would outgrow it.
+/// image is shared: copies of its texels would outgrow it.
 const MAX_REUSE: f64 = 1.25;
 
 /// The use of each texture of a [`Model`].
@@ -27,7 +27,7 @@ pub struct TexturePlan {
 }
 
 impl TexturePlan {
-    /// Decides from the model's triangles and materials, without looking at any picture.
+    /// Decides from the model's triangles and materials, without looking at any image.
     pub fn new(model: &Model) -> Self {
         let mut areas = vec![0.0; model.textures.len()];
         let mut uses = vec![TextureUse::Unused; model.textures.len()];

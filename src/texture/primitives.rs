@@ -1,5 +1,5 @@
-//! The primitives of a node's file: its triangles grouped by how they look, vertices that become
-//! two where their texels went to different places, and colours and texture coordinates of each.
+//! The primitives of a node's file: its triangles grouped by appearance, vertices that become
+//! two where their texels went to different positions, and colours and texture coordinates of each.
 
 use std::collections::BTreeMap;
 
@@ -10,22 +10,23 @@ use crate::format::{NodeImageData, Primitive, Surface};
 use crate::mesh::{AlphaMode, Wrap};
 
 /// What primitives are told apart by, besides their image.
-type LookKey = (u8, u32, bool);
+type AppearanceKey = (u8, u32, bool);
 
 /// The triangles of one primitive.
 struct Group {
     image: Option<usize>,
-    /// Vertices of the mesh and the place of their texels.
+    /// Vertices of the mesh and the placement of their texels.
     vertices: Vec<(u32, u32)>,
     indices: Vec<u32>,
+    skirt_triangles: usize,
     /// Materials in order of first use.
     materials: Vec<u32>,
 }
 
 /// The vertices that primitives have so far: one of the mesh becomes two where its triangles'
-/// texels went to different places.
+/// texels went to different positions.
 struct Slots {
-    /// By vertex: the place it was first met with and its slot.
+    /// By vertex: the placement it was first met with and its slot.
     first: Vec<Option<(u32, u32)>>,
     others: FxHashMap<(u32, u32), u32>,
 }
@@ -35,34 +36,39 @@ impl Slots {
         Self { first: vec![None; vertices], others: FxHashMap::default() }
     }
 
-    fn get(&mut self, vertex: u32, place: u32, add: impl FnOnce() -> u32) -> u32 {
+    fn get(&mut self, vertex: u32, placement: u32, add: impl FnOnce() -> u32) -> u32 {
         match &mut self.first[vertex as usize] {
-            Some((same, slot)) if *same == place => *slot,
-            Some(_) => *self.others.entry((vertex, place)).or_insert_with(add),
-            empty => empty.insert((place, add())).1,
+            Some((same, slot)) if *same == placement => *slot,
+            Some(_) => *self.others.entry((vertex, placement)).or_insert_with(add),
+            empty => empty.insert((placement, add())).1,
         }
     }
 }
 
 impl NodeBuilder<'_> {
-    /// Groups the triangles by how they look.
+    /// Groups the triangles by appearance.
     pub(super) fn primitives(&self) -> Vec<Primitive> {
         let mut groups: Vec<Group> = Vec::new();
-        let mut by_look: BTreeMap<(Option<usize>, [u8; 2], LookKey), usize> = BTreeMap::new();
+        let mut by_appearance: BTreeMap<(Option<usize>, [u8; 2], AppearanceKey), usize> =
+            BTreeMap::new();
         let mut last: Option<(u32, Option<usize>, usize)> = None;
         let mut slots = Slots::new(self.mesh.positions.len());
-        for (triangle, place) in self.mesh.triangles.iter().zip(&self.place_of) {
+        let first_skirt = self.mesh.triangles.len() - self.skirt_triangles;
+        for (number, (triangle, placement)) in
+            self.mesh.triangles.iter().zip(&self.placement_of).enumerate()
+        {
             let material = self.mesh.triangle_material(*triangle);
-            let image = self.places.get(*place as usize).map(|place| place.image);
+            let image = self.placements.get(*placement as usize).map(|placement| placement.image);
             let index = match last {
-                Some((same, picture, index)) if same == material && picture == image => index,
+                Some((same, same_image, index)) if same == material && same_image == image => index,
                 _ => {
-                    let key = (image, self.wrap_key(material, image), self.look(material));
-                    let index = *by_look.entry(key).or_insert_with(|| {
+                    let key = (image, self.wrap_key(material, image), self.appearance(material));
+                    let index = *by_appearance.entry(key).or_insert_with(|| {
                         groups.push(Group {
                             image,
                             vertices: Vec::new(),
                             indices: Vec::new(),
+                            skirt_triangles: 0,
                             materials: Vec::new(),
                         });
                         groups.len() - 1
@@ -75,9 +81,10 @@ impl NodeBuilder<'_> {
                 }
             };
             let group = &mut groups[index];
+            group.skirt_triangles += usize::from(number >= first_skirt);
             for vertex in triangle {
-                let slot = slots.get(*vertex, *place, || {
-                    group.vertices.push((*vertex, *place));
+                let slot = slots.get(*vertex, *placement, || {
+                    group.vertices.push((*vertex, *placement));
                     group.vertices.len() as u32 - 1
                 });
                 group.indices.push(slot);
@@ -87,7 +94,7 @@ impl NodeBuilder<'_> {
     }
 
     /// Alpha and sides of a material, as a key.
-    fn look(&self, material: u32) -> LookKey {
+    fn appearance(&self, material: u32) -> AppearanceKey {
         let Some(material) = self.block.model.materials.get(material as usize) else {
             return (0, 0, true);
         };
@@ -99,7 +106,7 @@ impl NodeBuilder<'_> {
         (mode, cutoff, material.double_sided)
     }
 
-    /// The wrapping of a primitive: the material's where the picture is shared; in atlases that of
+    /// The wrapping of a primitive: the material's where the image is shared; in atlases that of
     /// the page.
     fn wrap(&self, material: u32, image: Option<usize>) -> [Wrap; 2] {
         let shared = image
@@ -129,15 +136,16 @@ impl NodeBuilder<'_> {
             Some(_) => group
                 .vertices
                 .iter()
-                .map(|(vertex, place)| {
+                .map(|(vertex, placement)| {
                     let uv = mesh.texcoords[*vertex as usize];
                     let chart = self.charts.of_vertex[*vertex as usize] as usize;
                     let mapping = self.mappings.get(chart).copied().flatten();
-                    let (Some(mapping), Some(place)) = (mapping, self.places.get(*place as usize))
+                    let (Some(mapping), Some(placement)) =
+                        (mapping, self.placements.get(*placement as usize))
                     else {
                         return uv;
                     };
-                    place.texcoord(mapping.texel(uv))
+                    placement.texcoord(mapping.texel(uv))
                 })
                 .collect(),
         };
@@ -154,6 +162,7 @@ impl NodeBuilder<'_> {
                 double_sided: source.is_none_or(|material| material.double_sided),
             },
             indices: group.indices,
+            skirt_triangles: group.skirt_triangles,
         }
     }
 

@@ -1,15 +1,15 @@
-//! Making pictures smaller: area averages in linear light, weighted by coverage or alpha.
+//! Making images smaller: area averages in linear light, weighted by coverage or alpha.
 //!
-//! A texel of the smaller picture is the mean of the source's area that it covers (exact box
+//! A texel of the smaller image is the mean of the source's area that it covers (exact box
 //! filter at any ratio). Texels that nothing uses have no weight, so that an atlas's background
 //! never mixes into what is seen.
 
-use super::srgb;
+use crate::color;
 
 /// Full weight, and white.
 const FULL: u16 = u16::MAX;
 
-/// A picture in linear light.
+/// An image in linear light.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LinearImage {
     pub width: usize,
@@ -20,7 +20,7 @@ pub(crate) struct LinearImage {
     pub weight: Vec<u16>,
 }
 
-/// Rows of a picture as the scaler reads them: in order, each at most once.
+/// Rows of an image as the scaler reads them: in order, each at most once.
 pub(crate) trait Rows {
     fn size(&self) -> [usize; 2];
 
@@ -68,9 +68,9 @@ fn taps(index: usize, step: f64, size: usize) -> Taps {
     Taps { start, weights }
 }
 
-/// The size of a picture of `size` texels when `step` source texels become one.
+/// The size of an image of `size` texels when `step` source texels become one.
 pub(crate) fn scaled_size(size: usize, step: f64) -> usize {
-    // A last texel of which less than a thousandth is covered is rounding, not picture.
+    // A last texel of which less than a thousandth is covered is rounding, not image.
     ((size as f64 / step - 1e-3).ceil() as usize).max(1)
 }
 
@@ -274,13 +274,13 @@ impl Columns {
 impl LinearImage {
     /// Back to sRGB bytes, three a texel.
     pub fn to_rgb8(&self) -> Vec<u8> {
-        let table = srgb::to_byte();
+        let table = color::linear_to_byte();
         self.rgb.iter().map(|value| table.of(*value)).collect()
     }
 
     /// Back to sRGB bytes with the weight as alpha, four a texel.
     pub fn to_rgba8(&self) -> Vec<u8> {
-        let table = srgb::to_byte();
+        let table = color::linear_to_byte();
         let mut pixels = Vec::with_capacity(self.width * self.height * 4);
         for (index, texel) in self.rgb.as_chunks::<3>().0.iter().enumerate() {
             let alpha = self.weight.get(index).copied().unwrap_or(FULL);
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_picture_stays_flat_at_any_ratio() {
+    fn a_flat_image_stays_flat_at_any_ratio() {
         for value in [0, 20, 1000, 33333, FULL] {
             let flat = image(37, 23, |_, _| value);
             for step in [1.0, 1.01, 1.37, 2.0, 2.5, 7.3] {

@@ -51,7 +51,7 @@ impl Shape {
     }
 
     /// The shape with columns and rows exchanged.
-    pub fn turned(&self) -> Shape {
+    pub fn transposed(&self) -> Shape {
         let mut grid = BitGrid::new(self.size[1], self.size[0]);
         for [row, start, end] in &self.runs {
             (*start..*end).for_each(|x| grid.set(*row as usize, x as usize));
@@ -67,9 +67,9 @@ mod tests {
     #[test]
     fn turning_twice_changes_nothing_and_once_exchanges_the_axes() {
         let shape = Shape { size: [5, 3], runs: vec![[0, 0, 5], [1, 2, 3], [2, 1, 2], [2, 3, 5]] };
-        let turned = shape.turned();
-        assert_eq!((turned.size, turned.area()), ([3, 5], shape.area()));
-        assert_eq!(turned.runs[0], [0, 0, 1]);
-        assert_eq!(turned.turned(), shape);
+        let transposed = shape.transposed();
+        assert_eq!((transposed.size, transposed.area()), ([3, 5], shape.area()));
+        assert_eq!(transposed.runs[0], [0, 0, 1]);
+        assert_eq!(transposed.transposed(), shape);
     }
 }

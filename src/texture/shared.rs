@@ -21,7 +21,7 @@ pub struct SharedFile {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// The encoded picture.
+    /// The encoded image.
     pub bytes: Vec<u8>,
 }
 
@@ -29,7 +29,7 @@ pub struct SharedFile {
 #[derive(Debug, Default)]
 pub struct SharedTextures {
     files: Mutex<BTreeMap<Arc<str>, Arc<OnceLock<Result<SharedFile, String>>>>>,
-    /// Texels of each picture at full resolution, by content.
+    /// Texels of each image at full resolution, by content.
     sources: Mutex<BTreeMap<[u8; 32], u64>>,
 }
 
@@ -39,7 +39,7 @@ impl SharedTextures {
         Self::default()
     }
 
-    /// The texels of all pictures at full resolution, each once: what the source uses of them.
+    /// The texels of all images at full resolution, each once: what the source uses of them.
     pub fn source_texels(&self) -> u64 {
         self.sources.lock().unwrap_or_else(PoisonError::into_inner).values().sum()
     }
@@ -53,7 +53,7 @@ impl SharedTextures {
             .collect()
     }
 
-    /// The picture at a resolution for texels `step` times as wide as the source's, at least 1.
+    /// The image at a resolution for texels `step` times as wide as the source's, at least 1.
     pub(crate) fn image(
         &self,
         texture_name: &str,
@@ -61,9 +61,9 @@ impl SharedTextures {
         step: f64,
         quality: u8,
     ) -> Result<NodeImage> {
-        let picture = &decoded.picture;
-        let [width, height] = resolution([picture.width, picture.height], step);
-        let extension = encode::extension(usize::from(picture.channels));
+        let image = &decoded.image;
+        let [width, height] = resolution([image.width, image.height], step);
+        let extension = encode::extension(usize::from(image.channels));
         let stem = sanitised_stem(texture_name);
         let hash = &decoded.hash().to_hex()[..8];
         let name: Arc<str> = format!("{stem}-{hash}-{width}x{height}.{extension}").into();
@@ -74,14 +74,14 @@ impl SharedTextures {
         };
         let made = slot.get_or_init(|| {
             let mut sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
-            sources.insert(*decoded.hash().as_bytes(), picture.texels());
+            sources.insert(*decoded.hash().as_bytes(), image.texels());
             drop(sources);
             let size = [width as usize, height as usize];
-            let channels = usize::from(picture.channels);
-            let encoded = if [width, height] == [picture.width, picture.height] {
-                encode::encode(&picture.pixels, size, channels, quality)
+            let channels = usize::from(image.channels);
+            let encoded = if [width, height] == [image.width, image.height] {
+                encode::encode(&image.pixels, size, channels, quality)
             } else {
-                let scaled = level::resize_whole(picture, size);
+                let scaled = level::resize_whole(image, size);
                 encode::encode(&scaled.pixels, size, channels, quality)
             };
             let bytes = encoded.map_err(|error| error.to_string())?.bytes;
@@ -126,11 +126,11 @@ fn sanitised_stem(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::Picture;
+    use crate::decode::DecodedTexture;
 
     fn decoded(width: u32, height: u32) -> Decoded {
         let pixels = (0..width * height * 3).map(|i| (i * 31) as u8).collect::<Vec<u8>>();
-        Decoded::new(Picture { width, height, channels: 3, pixels })
+        Decoded::new(DecodedTexture { width, height, channels: 3, pixels })
     }
 
     #[test]

@@ -3,42 +3,33 @@
 use std::io::Cursor;
 use std::path::PathBuf;
 
-use super::atlas::{Atlas, Page, Sheet, SheetPicture};
-use super::level::{LevelPicture, Region, level_pictures};
+use super::atlas::{Atlas, Page, Sheet, SheetImage};
+use super::level::{LevelImage, Region, level_images};
 use super::*;
+use crate::decode::DecodedTexture;
 use crate::format::{NodeImageData, NodeMesh};
-use crate::import::Picture;
 use crate::mesh::{
     AlphaMode, Group, Material, Mesh, Model, Part, TextureData, TextureSource, Wrap,
 };
+use crate::random::Random;
 
-/// A linear congruential generator: the same numbers everywhere.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (self.0 >> 33) as f64 / (1u64 << 31) as f64
-    }
-}
-
-/// A picture in which every texel differs from all others.
-fn numbered(width: u32, height: u32) -> Picture {
+/// An image in which every texel differs from all others.
+fn numbered(width: u32, height: u32) -> DecodedTexture {
     let pixels =
         (0..width * height).flat_map(|i| [(i % 251) as u8, (i / 251) as u8, (i >> 16) as u8]);
-    Picture { width, height, channels: 3, pixels: pixels.collect() }
+    DecodedTexture { width, height, channels: 3, pixels: pixels.collect() }
 }
 
-fn png(picture: &Picture) -> TextureData {
+fn png(image: &DecodedTexture) -> TextureData {
     use image::ImageEncoder;
     let mut bytes = Vec::new();
-    let color = if picture.channels == 4 {
+    let color = if image.channels == 4 {
         image::ExtendedColorType::Rgba8
     } else {
         image::ExtendedColorType::Rgb8
     };
     image::codecs::png::PngEncoder::new(Cursor::new(&mut bytes))
-        .write_image(&picture.pixels, picture.width, picture.height, color)
+        .write_image(&image.pixels, image.width, image.height, color)
         .expect("encodes");
     TextureData::Embedded(bytes.into())
 }
@@ -77,22 +68,22 @@ fn of_page(page: &Page) -> impl Fn(usize, usize) -> [f64; 3] + '_ {
     }
 }
 
-fn of_level(level: &LevelPicture) -> impl Fn(usize, usize) -> [f64; 3] + '_ {
+fn of_level(level: &LevelImage) -> impl Fn(usize, usize) -> [f64; 3] + '_ {
     |x, y| {
         let texel = level.row(y, x, 1);
         [0, 1, 2].map(|channel| f64::from(texel[channel]))
     }
 }
 
-/// Charts of several triangles scattered over a picture: corners, and the chart of each triangle.
+/// Charts of several triangles scattered over an image: corners, and the chart of each triangle.
 fn scattered(random: &mut Random, side: f64) -> (Vec<[[f64; 2]; 3]>, Vec<u32>) {
     let mut corners = Vec::new();
     let mut charts = Vec::new();
-    for chart in 0..4 + (random.next() * 12.0) as u32 {
-        let mut point = [random.next() * side, random.next() * side];
+    for chart in 0..4 + (random.unit() * 12.0) as u32 {
+        let mut point = [random.unit() * side, random.unit() * side];
         let mut next = || {
             point =
-                point.map(|value| (value + (random.next() - 0.4) * side * 0.2).clamp(0.0, side));
+                point.map(|value| (value + (random.unit() - 0.4) * side * 0.2).clamp(0.0, side));
             point
         };
         let mut strip = [next(), next(), next()];
@@ -105,17 +96,17 @@ fn scattered(random: &mut Random, side: f64) -> (Vec<[[f64; 2]; 3]>, Vec<u32>) {
     (corners, charts)
 }
 
-fn whole(picture: Picture) -> LevelPicture {
+fn whole(image: DecodedTexture) -> LevelImage {
     let region = Region {
         origin: [0; 2],
-        size: [picture.width as usize, picture.height as usize],
+        size: [image.width as usize, image.height as usize],
         covered: None,
     };
-    level_pictures(std::sync::Arc::new(picture), &region, &[1.0]).remove(0)
+    level_images(std::sync::Arc::new(image), &region, &[1.0]).remove(0)
 }
 
 fn inside([a, b, c]: [[f64; 2]; 3], random: &mut Random) -> [f64; 2] {
-    let (mut u, mut v) = (random.next(), random.next());
+    let (mut u, mut v) = (random.unit(), random.unit());
     if u + v > 1.0 {
         (u, v) = (1.0 - u, 1.0 - v);
     }
@@ -123,20 +114,20 @@ fn inside([a, b, c]: [[f64; 2]; 3], random: &mut Random) -> [f64; 2] {
 }
 
 fn place(atlas: &Atlas, triangle: usize, at: [f64; 2]) -> (usize, [f64; 2]) {
-    let place = atlas.places[atlas.patches[0][triangle] as usize];
-    (place.page, place.texel(at))
+    let placement = atlas.placements[atlas.patches[0][triangle] as usize];
+    (placement.page, placement.texel(at))
 }
 
 #[test]
 fn sampling_the_atlas_equals_sampling_the_source() {
-    let mut random = Random(7);
+    let mut random = Random::new(7, 0);
     let level = whole(numbered(256, 256));
     for (round, cell) in [2, 4, 8, 2, 4, 8, 2, 2].into_iter().enumerate() {
         let (corners, charts) = scattered(&mut random, 256.0);
-        let picture = SheetPicture { picture: &level, corners: corners.clone(), charts };
+        let image = SheetImage { image: &level, corners: corners.clone(), charts };
         // Every other round is forced onto several pages.
         let max_side = if round % 2 == 0 { 4096 } else { 160 };
-        let sheet = Sheet { pictures: vec![picture], cell, max_side };
+        let sheet = Sheet { images: vec![image], cell, max_side };
         let Some(atlas) = sheet.build(usize::MAX) else { continue };
         for (triangle, corners) in corners.iter().enumerate() {
             for _ in 0..40 {
@@ -157,18 +148,18 @@ fn sampling_the_atlas_equals_sampling_the_source() {
 #[test]
 fn mips_that_the_cell_promises_show_no_neighbour() {
     // Left of the middle red is used, right of it blue; each chart's surroundings carry on.
-    let mut random = Random(3);
+    let mut random = Random::new(3, 0);
     let size = 256usize;
     let red = |x: usize| if x < size / 2 { [255, 0, 0] } else { [0, 0, 255] };
     let pixels = (0..size * size).flat_map(|i| red(i % size)).collect();
-    let level = whole(Picture { width: 256, height: 256, channels: 3, pixels });
+    let level = whole(DecodedTexture { width: 256, height: 256, channels: 3, pixels });
     for (cell, mips) in [(2, 1), (4, 2), (8, 3)] {
         let (mut corners, mut charts) = scattered(&mut random, 100.0);
         let (right, more) = scattered(&mut random, 100.0);
         corners.extend(right.iter().map(|t| t.map(|at| [at[0] + 156.0, at[1]])));
         charts.extend(more.iter().map(|chart| chart + 100));
-        let picture = SheetPicture { picture: &level, corners: corners.clone(), charts };
-        let atlas = Sheet { pictures: vec![picture], cell, max_side: 4096 }.build(1).expect("fits");
+        let image = SheetImage { image: &level, corners: corners.clone(), charts };
+        let atlas = Sheet { images: vec![image], cell, max_side: 4096 }.build(1).expect("fits");
         let mut page = atlas.pages[0].clone();
         for mip in 0..=mips {
             let scale = 1.0 / f64::from(1 << mip);
@@ -215,7 +206,7 @@ struct Scene {
 }
 
 fn scene(
-    pictures: &[Picture],
+    images: &[DecodedTexture],
     materials: &[(Option<u32>, Wrap)],
     triangles: &[(u32, [[f32; 2]; 3])],
 ) -> Scene {
@@ -256,12 +247,12 @@ fn scene(
             }
         })
         .collect();
-    let textures = pictures
+    let textures = images
         .iter()
         .enumerate()
-        .map(|(index, picture)| TextureSource {
+        .map(|(index, image)| TextureSource {
             name: format!("Texture {index}.png"),
-            data: png(picture),
+            data: png(image),
             opacity: None,
         })
         .collect();
@@ -290,7 +281,11 @@ fn nodes(
     let cache = TextureCache::new(&scene.model, &plan, [materials]);
     let block = BlockTextures::prepare(&cache, &shared, &scene.mesh, factors, options);
     let nodes = (0..factors.len())
-        .map(|level| block.node_mesh(&scene.mesh, &[], level, [1.0, 2.0, 3.0]).expect("builds"))
+        .map(|level| {
+            block
+                .node_mesh(&scene.mesh, &AppendedSkirts::default(), level, [1.0, 2.0, 3.0])
+                .expect("builds")
+        })
         .collect();
     drop(block);
     (nodes, shared.into_files())
@@ -298,17 +293,17 @@ fn nodes(
 
 fn decode(mesh: &NodeMesh, image: usize) -> Page {
     let NodeImageData::Embedded { bytes, .. } = &mesh.images[image].data else { panic!("shared") };
-    let picture = image::load_from_memory(bytes).expect("decodes").into_rgb8();
-    let size = [picture.width() as usize, picture.height() as usize];
+    let decoded = image::load_from_memory(bytes).expect("decodes").into_rgb8();
+    let size = [decoded.width() as usize, decoded.height() as usize];
     assert_eq!(size, [mesh.images[image].width as usize, mesh.images[image].height as usize]);
-    Page { size, pixels: picture.into_raw() }
+    Page { size, pixels: decoded.into_raw() }
 }
 
 const FINEST: TextureOptions =
     TextureOptions { jpeg_quality: 100, max_atlas: 4096, seams: Seams::Keep, root_triangles: 900 };
 
-/// A picture that JPEG keeps well.
-fn smooth(width: u32, height: u32) -> Picture {
+/// An image that JPEG keeps well.
+fn smooth(width: u32, height: u32) -> DecodedTexture {
     let wave = |value: u32, of: u32| {
         let angle = f64::from(value) / f64::from(of) * std::f64::consts::TAU;
         (128.0 + 100.0 * angle.sin()) as u8
@@ -316,12 +311,12 @@ fn smooth(width: u32, height: u32) -> Picture {
     let pixels = (0..width * height)
         .flat_map(|i| [wave(i % width, width), wave(i / width, height), 128])
         .collect();
-    Picture { width, height, channels: 3, pixels }
+    DecodedTexture { width, height, channels: 3, pixels }
 }
 
 /// The greatest difference between drawing the node and drawing the source, which repeats.
-fn difference(scene: &Scene, node: &TexturedNode, source: &Picture) -> f64 {
-    let mut random = Random(11);
+fn difference(scene: &Scene, node: &TexturedNode, source: &DecodedTexture) -> f64 {
+    let mut random = Random::new(11, 0);
     let mut greatest: f64 = 0.0;
     let size = [source.width as usize, source.height as usize];
     for primitive in &node.mesh.primitives {
@@ -335,10 +330,9 @@ fn difference(scene: &Scene, node: &TexturedNode, source: &Picture) -> f64 {
                 [0, 1, 2].map(|c| scene.mesh.texcoords[scene.mesh.triangles[index][c] as usize]);
             let new = [0, 1, 2].map(|c| primitive.texcoords[triangle[c] as usize]);
             for _ in 0..20 {
-                let seed = random.0;
-                let at_old = inside(corners(old, size), &mut Random(seed));
-                let at_new = inside(corners(new, page.size), &mut Random(seed));
-                random.next();
+                let seed = random.bits();
+                let at_old = inside(corners(old, size), &mut Random::new(seed, 0));
+                let at_new = inside(corners(new, page.size), &mut Random::new(seed, 0));
                 let texel = |x: usize, y: usize| {
                     let texel = &source.pixels[(y % size[1] * size[0] + x % size[0]) * 3..];
                     [0, 1, 2].map(|channel| f64::from(texel[channel]))
@@ -427,7 +421,7 @@ fn texels_used_many_times_are_shared_and_charts_over_them_drawn_once() {
 #[test]
 fn alpha_keeps_png_and_opaque_materials_do_not() {
     let pixels = (0..32 * 32).flat_map(|i| [10, 200, 30, if i % 3 == 0 { 0 } else { 255 }]);
-    let leaf = Picture { width: 32, height: 32, channels: 4, pixels: pixels.collect() };
+    let leaf = DecodedTexture { width: 32, height: 32, channels: 4, pixels: pixels.collect() };
     let triangle = [(0, [[0.1, 0.1], [0.9, 0.1], [0.1, 0.9]])];
     let mut scene = scene(&[leaf], &[(Some(0), Wrap::Repeat)], &triangle);
     let mime = |scene: &Scene| match &nodes(scene, &[4.0, 1.0], FINEST).0[0].mesh.images[0].data {
@@ -441,7 +435,7 @@ fn alpha_keeps_png_and_opaque_materials_do_not() {
 
 #[test]
 fn a_small_limit_gives_pages_to_leaves_and_a_warning_to_others() {
-    let mut random = Random(5);
+    let mut random = Random::new(5, 0);
     let (corners, charts) = scattered(&mut random, 1.0);
     let triangles: Vec<(u32, [[f32; 2]; 3])> = corners
         .iter()
@@ -478,7 +472,7 @@ fn untextured_materials_become_one_primitive_with_colours() {
 }
 
 #[test]
-fn absurd_coordinates_and_missing_pictures_do_no_harm() {
+fn absurd_coordinates_and_missing_images_do_no_harm() {
     let far = [
         (0, [[f32::NAN, 0.0], [f32::INFINITY, 1.0], [0.5, -1e30]]),
         (0, [[1e9, 1e9]; 3]),
@@ -487,13 +481,15 @@ fn absurd_coordinates_and_missing_pictures_do_no_harm() {
     ];
     let materials = [(Some(0), Wrap::Repeat), (Some(1), Wrap::Clamp)];
     let mut scene = scene(&[smooth(16, 16), smooth(16, 16)], &materials, &far);
-    scene.model.textures[1].data = TextureData::Embedded(b"not a picture".as_slice().into());
+    scene.model.textures[1].data = TextureData::Embedded(b"not an image".as_slice().into());
     let plan = TexturePlan::new(&scene.model);
     let shared = SharedTextures::new();
     let cache = TextureCache::new(&scene.model, &plan, [[0u32, 1]]);
     let block = BlockTextures::prepare(&cache, &shared, &scene.mesh, &[9.0, 1.0], FINEST);
     for level in 0..2 {
-        let node = block.node_mesh(&scene.mesh, &[], level, [0.0; 3]).expect("builds");
+        let node = block
+            .node_mesh(&scene.mesh, &AppendedSkirts::default(), level, [0.0; 3])
+            .expect("builds");
         let finite =
             |p: &crate::format::Primitive| p.texcoords.iter().flatten().all(|v| v.is_finite());
         assert!(node.mesh.primitives.iter().all(finite));
@@ -504,7 +500,7 @@ fn absurd_coordinates_and_missing_pictures_do_no_harm() {
 
 #[test]
 fn the_same_input_gives_the_same_bytes() {
-    let mut random = Random(9);
+    let mut random = Random::new(9, 0);
     let (corners, _) = scattered(&mut random, 1.0);
     let triangles: Vec<(u32, [[f32; 2]; 3])> =
         corners.iter().map(|t| (0, t.map(|at| at.map(|value| value as f32)))).collect();

@@ -4,12 +4,13 @@
 use glam::{DAffine3, DVec3};
 use serde_json::{Map, Value, json};
 
+use super::VERSION;
 use super::placed::place;
 use super::regions::root;
 use super::tile::Tile;
-use super::{TILESET_FILE, TILESETS_DIR, VERSION};
-use crate::build::quantize::Quantization;
 use crate::format::Scene;
+use crate::format::{TILESET_FILE, TILESETS_DIR};
+use crate::lattice::Quantization;
 use crate::place::Placement;
 use crate::{Error, Result};
 
@@ -100,7 +101,7 @@ impl Writer<'_> {
     /// From the leaves up, each tile takes its children into its file until there are too many;
     /// then the largest of them become files.
     fn tile(&mut self, tile: Tile, depth: usize) -> Pending {
-        let Tile { low, high, error, content, transform, children, .. } = tile;
+        let Tile { low, high, error, typical_error, content, transform, children, .. } = tile;
         let mut below: Vec<Pending> =
             children.into_iter().map(|child| self.tile(child, depth + 1)).collect();
         loop {
@@ -127,6 +128,9 @@ impl Writer<'_> {
         json.insert("geometricError".into(), json!(error));
         if depth == 0 {
             json.insert("refine".into(), json!("REPLACE"));
+        }
+        if let Some([mean, p95]) = typical_error.filter(|_| !below.is_empty()) {
+            json.insert("extras".into(), json!({ "meanError": mean, "p95Error": p95 }));
         }
         if let Some(uri) = content {
             json.insert("content".into(), json!({ "uri": uri }));

@@ -26,9 +26,5 @@ mod walk;
 pub use files::{MOST_TILES, TilesetFile, files};
 pub use rules::{Checked, Fault, check};
 
-/// The file that a viewer opens, inside an output folder.
-pub const TILESET_FILE: &str = "tileset.json";
-/// The folder of tilesets of regions inside an output folder.
-pub const TILESETS_DIR: &str = "tilesets";
 /// The version of 3D Tiles that is written.
 pub const VERSION: &str = "1.1";

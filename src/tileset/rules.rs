@@ -76,14 +76,14 @@ pub fn check(out: &Path, scene: &Scene, placement: &Placement) -> Result<Checked
         if count != Some(&1) {
             let found = count.copied().unwrap_or(0);
             let what = format!("content {content}: expected in one tile, found in {found}");
-            faults.push(Fault { place: super::TILESET_FILE.into(), what });
+            faults.push(Fault { place: crate::format::TILESET_FILE.into(), what });
         }
     }
     if let Some(off) = placed_within {
         let said = walk.extras["placed_within_metres"].as_f64().unwrap_or(0.0);
         if off > said + ROUNDING {
             let what = format!("a leaf is {off} m from its place, expected {said} m at most");
-            faults.push(Fault { place: super::TILESET_FILE.into(), what });
+            faults.push(Fault { place: crate::format::TILESET_FILE.into(), what });
         }
     }
     Ok(Checked { tiles: walk.tiles.len(), files: walk.files.len(), placed_within, faults })

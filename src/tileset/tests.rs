@@ -6,6 +6,7 @@ use super::files::files_of;
 use super::*;
 use crate::format::Scene;
 use crate::format::test_scene::scene;
+use crate::format::{TILESET_FILE, TILESETS_DIR};
 use crate::place::{Place, Placement};
 
 const UTM: Placement = Placement::Crs { epsg: 25832, height_offset: 0.0 };

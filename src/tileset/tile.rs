@@ -14,6 +14,9 @@ pub struct Tile {
     pub high: DVec3,
     /// Metres; never less than those below.
     pub error: f64,
+    /// Mean and 95th percentile of the distance to the source, metres; `None` where the tile only
+    /// groups others.
+    pub typical_error: Option<[f64; 2]>,
     /// A node's file, relative to the output folder; `None` where the tile only groups others.
     pub content: Option<String>,
     /// From its coordinates to its parent's; `None` where they are the same.
@@ -33,6 +36,7 @@ impl Tile {
             low,
             high,
             error: node.geometric_error,
+            typical_error: Some([node.mean_error, node.p95_error]),
             content: Some(format!("{NODES_DIR}/{}", node.file)),
             transform: None,
             children: scene.children(index).map(|child| Self::of_node(scene, child)).collect(),
@@ -68,7 +72,16 @@ impl Tile {
         let below = children.iter().map(|child| child.error).fold(0.0, f64::max);
         // Where it is not replaced, nothing is drawn: that is as wrong as the whole is large.
         let error = low.distance(high).max(below);
-        Self { low, high, error, content: None, transform: None, children, fit: None }
+        Self {
+            low,
+            high,
+            error,
+            typical_error: None,
+            content: None,
+            transform: None,
+            children,
+            fit: None,
+        }
     }
 
     /// The middle of its box.

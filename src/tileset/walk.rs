@@ -7,7 +7,8 @@ use std::path::{Component, Path, PathBuf};
 use glam::{DAffine3, DMat3, DVec3};
 use serde_json::Value;
 
-use super::{TILESET_FILE, VERSION};
+use super::VERSION;
+use crate::format::TILESET_FILE;
 
 /// Something in a tileset that the specification does not allow, or that is not so.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,12 +4,12 @@ use rayon::prelude::*;
 
 use super::distance::FrontDistances;
 use super::geometry::NodeGeometry;
-use super::look::{Color, squared_difference};
-use super::node_look::{NodePictures, NodePoint};
+use super::node_textures::{NodePoint, NodeTextures};
 use super::options::Limits;
 use super::points::Points;
 use super::report::{Check, LeafFigures, TileFigures};
 use super::source_colors::Shown;
+use super::surface_appearance::{Color, squared_difference};
 use super::tiles::{Tile, count};
 use super::tree::is_leaf;
 use crate::format::Scene;
@@ -31,18 +31,18 @@ pub(super) struct Reference {
 pub(super) fn leaf_colors(
     leaves: &[u32],
     points: &Points,
-    pictures: &NodePictures,
+    images: &NodeTextures,
     done: impl Fn() + Sync,
 ) -> Vec<Option<Color>> {
     let colors: Vec<Vec<Option<Color>>> = leaves
         .par_iter()
         .enumerate()
-        .map(|(place, &leaf)| {
-            let at: Vec<NodePoint> = points.all[points.of_leaf(place)]
+        .map(|(index, &leaf)| {
+            let at: Vec<NodePoint> = points.all[points.of_leaf(index)]
                 .iter()
                 .map(|point| (point.triangle, point.weights))
                 .collect();
-            let colors = if at.is_empty() { Vec::new() } else { pictures.colors(leaf, &at) };
+            let colors = if at.is_empty() { Vec::new() } else { images.colors(leaf, &at) };
             done();
             colors
         })
@@ -63,9 +63,9 @@ pub(super) fn texels(
     let mut check = Check::new("texels of the leaves");
     let jpeg = figures.jpeg_rms.unwrap_or(0.0);
     let (mut sum, mut compared) = (0.0, 0);
-    for (place, &leaf) in leaves.iter().enumerate() {
+    for (index, &leaf) in leaves.iter().enumerate() {
         let (mut squares, mut count) = (0.0, 0);
-        for number in points.of_leaf(place) {
+        for number in points.of_leaf(index) {
             if let (Some(color), Some(source)) = (shown[number], reference[number]) {
                 squares += squared_difference(color, source.color);
                 count += 1;
@@ -96,7 +96,7 @@ pub(super) fn texels(
     check.summary = format!(
         "colours off by {:.2} of 255 (RMS of {compared} samples); JPEG alone: {}",
         figures.color_rms,
-        figures.jpeg_rms.map_or("no pictures".into(), |rms| format!("{rms:.2}")),
+        figures.jpeg_rms.map_or("no images".into(), |rms| format!("{rms:.2}")),
     );
     check
 }
@@ -110,7 +110,7 @@ pub(super) fn level(
     distances: &FrontDistances,
     points: &Points,
     geometry: &[NodeGeometry],
-    pictures: &NodePictures,
+    images: &NodeTextures,
     leaf_shown: &[Option<Color>],
     reference: &Reference,
     done: impl Fn() + Sync,
@@ -127,7 +127,7 @@ pub(super) fn level(
             let node = group[0].1;
             let at: Vec<NodePoint> =
                 group.iter().map(|&(_, _, triangle, weights)| (triangle, weights)).collect();
-            let colors = pictures.colors(node, &at);
+            let colors = images.colors(node, &at);
             let scale = texel_scale(scene, geometry, node);
             let mut found = (0.0, 0, TileFigures::default());
             for (&(number, ..), color) in group.iter().zip(colors) {
@@ -174,9 +174,9 @@ pub(super) fn leaf_tiles(
             check.fail(place, what, "texels are misplaced: report this");
         }
     };
-    for (place, &leaf) in leaves.iter().enumerate() {
+    for (index, &leaf) in leaves.iter().enumerate() {
         let mut found = (0.0, 0, TileFigures::default());
-        for number in points.of_leaf(place) {
+        for number in points.of_leaf(index) {
             add(&mut found, number, shown[number], 1.0, reference);
         }
         let (_, _, tiles) = found;

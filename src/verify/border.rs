@@ -68,8 +68,8 @@ impl SeamGraph {
         graph
     }
 
-    fn number(&self, place: DVec3) -> Option<u32> {
-        self.numbers.get(&key(place.to_array())).copied()
+    fn number(&self, position: DVec3) -> Option<u32> {
+        self.numbers.get(&key(position.to_array())).copied()
     }
 
     /// The first vertex along the seam that the node has: `at`, which is reached from `before`, or
@@ -93,9 +93,9 @@ mod tests {
 
     /// Seams along x from 0 to 4, and what a node with triangles over some of their ends has.
     fn kept_by(triangles: &[[u32; 3]]) -> Vec<bool> {
-        let place = |x: u32| DVec3::new(f64::from(x), 0.0, 0.0);
+        let position = |x: u32| DVec3::new(f64::from(x), 0.0, 0.0);
         let seams: Vec<Seam> =
-            (0..4).map(|x| Seam { ends: [place(x), place(x + 1)], leaves: [0, 1] }).collect();
+            (0..4).map(|x| Seam { ends: [position(x), position(x + 1)], leaves: [0, 1] }).collect();
         // Vertex 5 lies beside the seam.
         let mut positions: Vec<[f32; 3]> = (0..5).map(|x| [x as f32, 0.0, 0.0]).collect();
         positions.push([2.0, 1.0, 0.0]);

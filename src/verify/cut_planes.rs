@@ -1,26 +1,20 @@
-//! Which triangles of coarse nodes lie in cutting planes: skirts, which cover gaps.
+//! Which triangles of coarse nodes are no part of their surface: skirts, which cover gaps.
 //!
-//! The format does not say which triangles these are. They are known by where they stand: in the
-//! plane of a cut that bounds their node, one or two of them together and joined to nothing else.
-//! They show only where levels meet. The source has no surface there, and skirts promise none: so
-//! they are no part of the distances between surfaces. What they do promise, that nothing shows
-//! between two levels, [`super::gaps`] checks. A skirt that is made otherwise counts as surface,
-//! and must be as near to the source as all of its node; so do those in a plane that the source has
-//! a wall in, where what is left of the wall looks the same.
+//! A file says which of its triangles are skirts. They show only where levels meet; the source has
+//! no surface there, so they are no part of the distances between surfaces. What they promise, that
+//! nothing shows between two levels, [`super::gaps`] checks. A skirt that does not lie in the plane
+//! of a cut that bounds its node counts as surface, and must be as near to the source as all of it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
 use super::geometry::NodeGeometry;
 use super::sample::cross;
 use super::seams::Seam;
-use super::tree::{apart, is_leaf, leaves, line};
+use super::tree::{apart, is_leaf};
 use crate::format::{Node, Scene};
-use crate::mesh::Runs;
-use crate::mesh::{PositionKey, key};
 
 /// How far a triangle in a cutting plane may be from it, as a share of its longest edge. A border
 /// vertex may lie beside the plane by a hundredth of the edge that was not split there.
@@ -47,33 +41,15 @@ pub(super) fn mark(scene: &Scene, geometry: &mut [NodeGeometry], seams: &[Seam],
             }
         }
     }
-    // Planes that the source has walls in: what stands for those cannot be told from skirts.
-    let mut walls: Vec<BTreeSet<Plane>> = vec![BTreeSet::new(); geometry.len()];
-    for leaf in leaves(scene) {
-        let around: BTreeSet<Plane> =
-            line(scene, leaf).flat_map(|node| &planes[node as usize]).copied().collect();
-        let node = &geometry[leaf as usize];
-        let of_leaf = around.into_iter().filter(|plane| {
-            let mut corners = node.triangles.iter().map(|&triangle| node.corners(triangle));
-            corners.any(|corners| lies_in(corners, plane, steps[leaf as usize]))
-        });
-        for plane in of_leaf.collect::<Vec<_>>() {
-            for above in line(scene, leaf) {
-                walls[above as usize].insert(plane);
-            }
-        }
-    }
     geometry.par_iter_mut().enumerate().for_each(|(number, node)| {
-        let planes: Vec<&Plane> = planes[number].difference(&walls[number]).collect();
-        if is_leaf(scene, number as u32) || planes.is_empty() {
+        if is_leaf(scene, number as u32) || planes[number].is_empty() {
             return;
         }
-        let alone = stand_alone(node).into_iter().zip(&node.triangles);
-        let is_skirt = |(alone, &triangle): (bool, &[u32; 3])| {
+        let in_cut_plane = |(&skirt, &triangle): (&bool, &[u32; 3])| {
             let corners = node.corners(triangle);
-            alone && planes.iter().any(|plane| lies_in(corners, plane, steps[number]))
+            skirt && planes[number].iter().any(|plane| lies_in(corners, plane, steps[number]))
         };
-        node.in_cut_plane = alone.map(is_skirt).collect();
+        node.in_cut_plane = node.skirts.iter().zip(&node.triangles).map(in_cut_plane).collect();
     });
 }
 
@@ -86,28 +62,6 @@ fn lies_in(corners: [DVec3; 3], &(axis, bits): &Plane, step: f64) -> bool {
     let normal = cross(corners);
     normal[axis].abs() >= FACING * normal.length()
         && corners.iter().all(|corner| (corner[axis] - coordinate).abs() <= beside)
-}
-
-/// Triangles a skirt has.
-const MOST_TOGETHER: u32 = 2;
-
-/// For each triangle, whether it is joined to one other triangle at most.
-fn stand_alone(node: &NodeGeometry) -> Vec<bool> {
-    let mut first: FxHashMap<PositionKey<f32>, u32> = FxHashMap::default();
-    let welded: Vec<u32> = (0..)
-        .zip(&node.positions)
-        .map(|(vertex, &position)| *first.entry(key(position)).or_insert(vertex))
-        .collect();
-    let mut runs = Runs::new(node.positions.len());
-    for triangle in &node.triangles {
-        let [a, b, c] = triangle.map(|vertex| welded[vertex as usize]);
-        runs.join(a, b);
-        runs.join(b, c);
-    }
-    let tops: Vec<u32> = node.triangles.iter().map(|t| runs.top(welded[t[0] as usize])).collect();
-    let mut counts = vec![0u32; node.positions.len()];
-    tops.iter().for_each(|&top| counts[top as usize] += 1);
-    tops.into_iter().map(|top| counts[top as usize] <= MOST_TOGETHER).collect()
 }
 
 /// The plane that holds most of the edges between two leaves and separates their boxes' middles.
@@ -167,9 +121,10 @@ mod tests {
         assert_eq!(plane_between(&[&beside], [&flat[0], &flat[1]], 1e-6), None);
     }
 
-    /// Two coarse nodes with a leaf each, apart at x = 5; the first has two triangles in that plane.
+    /// Two coarse nodes with a leaf each, apart at x = 5; the first has two triangles in that plane,
+    /// which are skirts where its file says so.
     #[test]
-    fn what_lies_in_a_plane_is_a_skirt_unless_the_source_has_a_wall_there() {
+    fn skirts_count_as_none_only_in_a_plane_that_bounds_their_node() {
         let node = |parent, first_child, next_sibling, low: f64, high: f64| Node {
             parent,
             first_child,
@@ -201,18 +156,22 @@ mod tests {
             geometry
         };
         let [ground, far] = [floor(0.0), floor(5.0)];
-        for (wall, expected) in [(false, [false, true, true]), (true, [false; 3])] {
-            let leaf = if wall { vec![&ground[..], &upright] } else { vec![&ground[..]] };
+        for (skirts, expected) in [
+            ([false, true, true], [false, true, true]),
+            ([false; 3], [false; 3]),
+            ([true; 3], [false, true, true]),
+        ] {
             let mut geometry = vec![
                 NodeGeometry::default(),
                 geometry_of(&[&ground, &upright]),
                 geometry_of(&[&far]),
-                geometry_of(&leaf),
+                geometry_of(&[&ground]),
                 geometry_of(&[&far]),
             ];
+            geometry[1].skirts = skirts.to_vec();
             mark(&scene, &mut geometry, &seams, &[1e-6; 5]);
             let marked: Vec<bool> = (0..3).map(|t| !geometry[1].is_surface(t)).collect();
-            assert_eq!(marked, expected, "wall in the source: {wall}");
+            assert_eq!(marked, expected, "{skirts:?}");
         }
     }
 }

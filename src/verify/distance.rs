@@ -9,13 +9,13 @@
 use rayon::prelude::*;
 
 use super::assembly::Assembly;
+use super::distance_stats::DistanceStats;
 use super::front::Front;
 use super::geometry::NodeGeometry;
 use super::points::Points;
 use super::progress::Progress;
 use super::report::Distance;
 use super::sample::spread;
-use super::tally::Tally;
 use super::tree::is_leaf;
 use crate::format::Scene;
 use crate::mesh::Surface;
@@ -26,16 +26,9 @@ pub(super) struct NodeDistances {
     /// The node.
     pub node: u32,
     /// From the source below it to the front.
-    pub to_front: Tally,
+    pub to_front: DistanceStats,
     /// From it to the source.
-    pub to_source: Tally,
-}
-
-impl NodeDistances {
-    /// The larger maximum of both directions, metres.
-    pub fn max(&self) -> f64 {
-        self.to_front.max().max(self.to_source.max())
-    }
+    pub to_source: DistanceStats,
 }
 
 /// What was measured of a front.
@@ -43,9 +36,9 @@ pub(super) struct FrontDistances {
     /// Its nodes that are no leaves, in order.
     pub nodes: Vec<NodeDistances>,
     /// From the source to the front.
-    pub to_front: Tally,
+    pub to_front: DistanceStats,
     /// From the front to the source.
-    pub to_source: Tally,
+    pub to_source: DistanceStats,
     /// For each point that lies below a coarse node, its number, and the node, triangle and
     /// weights of the front's closest point.
     pub closest: Vec<(u32, u32, u32, [f64; 3])>,
@@ -72,59 +65,59 @@ pub(super) fn measure(
     }
 
     // Leaf by leaf: sums are formed in the order of leaves, whatever thread took them.
-    let from_leaves: Vec<(u32, Tally, Vec<_>)> = leaves
+    let from_leaves: Vec<(u32, DistanceStats, Vec<_>)> = leaves
         .par_iter()
         .enumerate()
-        .filter_map(|(place, &leaf)| {
+        .filter_map(|(index, &leaf)| {
             let above = front.above(scene, leaf).filter(|&node| node != leaf)?;
-            let mut tally = Tally::default();
+            let mut stats = DistanceStats::default();
             let mut closest = Vec::new();
-            for number in points.of_leaf(place) {
+            for number in points.of_leaf(index) {
                 let point = points.all[number].point;
                 let Some(hit) = assembly.surface.closest(point) else { continue };
-                tally.add(hit.distance(), point);
+                stats.add(hit.distance());
                 let (node, triangle) = assembly.owner(hit.triangle);
                 closest.push((number as u32, node, triangle, hit.weights));
             }
             for vertex in geometry[leaf as usize].surface_vertices() {
-                tally.reach(assembly.surface.distance(vertex), vertex);
+                stats.reach(assembly.surface.distance(vertex));
             }
             progress.done(1);
-            Some((above, tally, closest))
+            Some((above, stats, closest))
         })
         .collect();
     let mut closest = Vec::new();
-    for (above, tally, hits) in from_leaves {
-        nodes[place_of[above as usize]].to_front.extend(&tally);
+    for (above, stats, hits) in from_leaves {
+        nodes[place_of[above as usize]].to_front.extend(&stats);
         closest.extend(hits);
     }
 
-    let from_nodes: Vec<Tally> = nodes
+    let from_nodes: Vec<DistanceStats> = nodes
         .par_iter()
         .map(|measured| {
             let node = &geometry[measured.node as usize];
-            let mut tally = Tally::default();
+            let mut stats = DistanceStats::default();
             // Draws that differ from level to level.
             let stream = scene.nodes[measured.node as usize].id;
             for sample in spread(node.surface(), points.density, seed, stream) {
-                tally.add(reference.distance(sample.point), sample.point);
+                stats.add(reference.distance(sample.point));
             }
             for vertex in node.surface_vertices() {
-                tally.reach(reference.distance(vertex), vertex);
+                stats.reach(reference.distance(vertex));
             }
             progress.done(1);
-            tally
+            stats
         })
         .collect();
-    let (mut to_front, mut to_source) = <(Tally, Tally)>::default();
-    for (node, tally) in nodes.iter_mut().zip(from_nodes) {
-        node.to_source = tally;
+    let (mut to_front, mut to_source) = <(DistanceStats, DistanceStats)>::default();
+    for (node, stats) in nodes.iter_mut().zip(from_nodes) {
+        node.to_source = stats;
         to_front.extend(&node.to_front);
         to_source.extend(&node.to_source);
     }
-    for (place, &leaf) in leaves.iter().enumerate() {
+    for (index, &leaf) in leaves.iter().enumerate() {
         if front.has(leaf) {
-            let count = points.of_leaf(place).len() as u64;
+            let count = points.of_leaf(index).len() as u64;
             to_front.add_zeros(count);
             to_source.add_zeros(count);
         }
@@ -132,17 +125,17 @@ pub(super) fn measure(
     FrontDistances { nodes, to_front, to_source, closest }
 }
 
-/// A tally in metres and in units of 1e-4 of a diagonal.
-pub(super) fn figures(tally: &Tally, diagonal: f64) -> Distance {
+/// A stats in metres and in units of 1e-4 of a diagonal.
+pub(super) fn figures(stats: &DistanceStats, diagonal: f64) -> Distance {
     let unit = if diagonal > 0.0 { 1e4 / diagonal } else { 0.0 };
     Distance {
-        samples: tally.count(),
-        mean: tally.mean(),
-        rms: tally.rms(),
-        max: tally.max(),
-        mean_relative: tally.mean() * unit,
-        rms_relative: tally.rms() * unit,
-        max_relative: tally.max() * unit,
+        samples: stats.count(),
+        mean: stats.mean(),
+        rms: stats.rms(),
+        max: stats.max(),
+        mean_relative: stats.mean() * unit,
+        rms_relative: stats.rms() * unit,
+        max_relative: stats.max() * unit,
     }
 }
 
@@ -263,8 +256,8 @@ mod tests {
             let max = vertices.iter().map(|&p| naive(p, &source)).chain(distances.clone());
             let max = max.fold(0.0, f64::max);
             let mean = distances.sum::<f64>() / spots.len() as f64;
-            let tally = found.nodes[0].to_source;
-            assert!((tally.mean() - mean).abs() < 1e-9 && (tally.max() - max).abs() < 1e-9);
+            let stats = found.nodes[0].to_source;
+            assert!((stats.mean() - mean).abs() < 1e-9 && (stats.max() - max).abs() < 1e-9);
         }
     }
 }

@@ -12,8 +12,8 @@ use super::report::{Check, LeafFigures};
 use super::sample::area;
 use super::seams::Seam;
 use super::source::Source;
-use crate::build::quantize::Quantization;
 use crate::format::Scene;
+use crate::lattice::Quantization;
 
 /// How far a point of a leaf may be from the source for rounding, metres: half a step along each
 /// axis for the rounding of source vertices, and as much again for each cut on the way to the
@@ -118,10 +118,10 @@ pub(super) fn faithful(
     let found = |vertex: usize| {
         let point = surface.positions()[vertex];
         if let Some(lattice) = lattice {
-            let place = DVec3::from(point.to_array().map(|c| lattice.round(c)));
-            return assembly.surface.within(place, finest * LAST_BITS).iter().any(|hit| {
-                assembly.surface.corners(hit.triangle).contains(&place)
-                    && (place - point).length() <= lattice.bound() * (1.0 + LAST_BITS)
+            let rounded = DVec3::from(point.to_array().map(|c| lattice.round(c)));
+            return assembly.surface.within(rounded, finest * LAST_BITS).iter().any(|hit| {
+                assembly.surface.corners(hit.triangle).contains(&rounded)
+                    && (rounded - point).length() <= lattice.bound() * (1.0 + LAST_BITS)
             });
         }
         [finest, coarsest].iter().any(|step| {
@@ -161,9 +161,9 @@ pub(super) fn faithful(
     let farthest: Vec<f64> = leaves
         .par_iter()
         .enumerate()
-        .map(|(place, &leaf)| {
+        .map(|(index, &leaf)| {
             let vertices = geometry[leaf as usize].surface_vertices();
-            let samples = points.of_leaf(place).map(|number| points.all[number].point);
+            let samples = points.of_leaf(index).map(|number| points.all[number].point);
             progress.done(1);
             vertices.into_iter().chain(samples).map(|p| surface.distance(p)).fold(0.0, f64::max)
         })

@@ -4,7 +4,7 @@
 //! leaf may be drawn beside what stands above the other, at any two levels. A point of the seam is
 //! closed where both sides reach it, with their surface or with a skirt in the plane of the cut:
 //! then both are joined there, whatever their levels are. Otherwise the gap at the point is the
-//! distance between the places of both sides that are nearest to it.
+//! distance between the points of both sides that are nearest to it.
 //!
 //! Where the source ends near the seam, a node may leave out the strip up to there, and with it its
 //! border ([`super::border`]): then the hole beside it has grown by no more than the node's error,
@@ -31,13 +31,13 @@ use super::tree::{apart, input_of, is_leaf, line};
 use crate::format::Scene;
 use crate::mesh::Surface;
 
-/// Where along an edge of the seam is looked.
+/// Where along an edge of the seam gaps are measured.
 const PLACES: [f64; 3] = [0.0, 0.5, 1.0];
 
 /// How a side meets the seam at a point.
 #[derive(Clone, Copy)]
 struct Meets {
-    /// The place of the node nearest to the point, skirts included.
+    /// The point of the node nearest to the point, skirts included.
     drawn: DVec3,
     /// The same without triangles in cutting planes.
     bare: DVec3,
@@ -45,8 +45,8 @@ struct Meets {
     kept: bool,
 }
 
-/// What all groups of seams are looked at with.
-struct Look<'a> {
+/// What all groups of seams are checked with.
+struct SeamCheck<'a> {
     scene: &'a Scene,
     geometry: &'a [NodeGeometry],
     /// Where the source ends, and the leaf that has each edge.
@@ -56,7 +56,7 @@ struct Look<'a> {
     limits: &'a Limits,
 }
 
-impl Look<'_> {
+impl SeamCheck<'_> {
     /// True where the source ends within the node's error of a point, in a leaf below the node.
     fn ends_near(&self, node: u32, point: DVec3) -> bool {
         let reach = self.scene.nodes[node as usize].geometric_error;
@@ -75,7 +75,7 @@ struct Found {
     failures: Vec<(f64, Failure)>,
 }
 
-/// Looks at all seams; `open` are the edges at which the leaves end.
+/// Checks all seams; `open` are the edges at which the leaves end.
 pub(super) fn gaps(
     scene: &Scene,
     geometry: &[NodeGeometry],
@@ -88,11 +88,11 @@ pub(super) fn gaps(
     let mut check = Check::new("gaps");
     progress.phase("gaps", seams.len() as u64);
     let lines = Lines::new(open.iter().map(|&(ends, _)| ends));
-    let look = Look { scene, geometry, open, lines, steps, limits };
+    let checker = SeamCheck { scene, geometry, open, lines, steps, limits };
     let found: Vec<Found> = groups(scene, seams)
         .par_iter()
         .map(|group| {
-            let found = look.at(group);
+            let found = checker.check(group);
             progress.done(group.len() as u64);
             found
         })
@@ -147,8 +147,8 @@ fn groups<'a>(scene: &Scene, seams: &'a [Seam]) -> Vec<Vec<&'a Seam>> {
     groups.into_values().collect()
 }
 
-impl Look<'_> {
-    fn at(&self, seams: &[&Seam]) -> Found {
+impl SeamCheck<'_> {
+    fn check(&self, seams: &[&Seam]) -> Found {
         let Self { scene, geometry, steps, limits, .. } = *self;
         let points = |seam: &Seam| PLACES.map(|at| seam.ends[0].lerp(seam.ends[1], at));
         let sides: Vec<[Vec<u32>; 2]> =
@@ -196,9 +196,9 @@ impl Look<'_> {
                     "shared" => tolerance + 2.0 * error,
                     _ => tolerance,
                 };
-                for (place, &point) in points.iter().enumerate() {
+                for (index, &point) in points.iter().enumerate() {
                     let at = |node: u32| match meets.get(&node) {
-                        Some(node) => node.meets[&number][place],
+                        Some(node) => node.meets[&number][index],
                         None => Meets { drawn: point, bare: point, kept: true },
                     };
                     let (one, other) = (at(a), at(b));
@@ -279,7 +279,7 @@ struct NodeAtSeams {
 }
 
 impl NodeAtSeams {
-    /// The place of the node's rim nearest to a point.
+    /// The point of the node's rim nearest to a point.
     fn rim(&self, point: DVec3) -> DVec3 {
         let on_edge = |&[from, to]: &[DVec3; 2]| {
             let along = to - from;

@@ -14,7 +14,10 @@ pub(super) struct NodeGeometry {
     pub positions: Vec<[f32; 3]>,
     /// Vertices of each triangle.
     pub triangles: Vec<[u32; 3]>,
-    /// Which triangles lie in a cutting plane (see [`super::cut_planes`]); empty where none does.
+    /// Which triangles are skirts, as the file says.
+    pub skirts: Vec<bool>,
+    /// Which of these lie in a cutting plane (see [`super::cut_planes`]) and are no part of the
+    /// surface; empty where none does.
     pub in_cut_plane: Vec<bool>,
 }
 
@@ -27,6 +30,8 @@ impl NodeGeometry {
             geometry.positions.extend(&primitive.positions);
             let triangles = primitive.indices.as_chunks::<3>().0;
             geometry.triangles.extend(triangles.iter().map(|t| t.map(|vertex| first + vertex)));
+            geometry.skirts.resize(geometry.triangles.len() - primitive.skirt_triangles, false);
+            geometry.skirts.resize(geometry.triangles.len(), true);
         }
         geometry
     }

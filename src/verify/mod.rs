@@ -1,5 +1,5 @@
 //! Verifying a built scene: that it is whole, that its leaves are the source, how far each level is
-//! from it, that nothing shows between levels, and how levels look.
+//! from it, that nothing shows between levels, and how levels appearance.
 //!
 //! | file | what it checks |
 //! |---|---|
@@ -7,18 +7,20 @@
 //! | `faithful` | leaves against the source: area, vertices, surface |
 //! | `joints` | leaves meet edge to edge |
 //! | `appearance` | leaves' texels; colours and tiles of every level |
-//! | `distance`, `errors` | each level against the source, stored against measured errors |
+//! | `distance` | each level against the source |
+//! | `node_errors`, `errors` | each node against the leaves below it; stored against measured errors |
 //! | `seams`, `cut_planes`, `border`, `gaps` | what shows where two levels meet |
 //!
 //! Without a source the leaves stand for it, and what needs it is not checked. Triangles of all
 //! nodes are kept in memory (some 30 bytes each), and the source with its search tree (some 150
-//! bytes a triangle); pictures are decoded node by node.
+//! bytes a triangle); images are decoded node by node.
 
 mod appearance;
 mod assembly;
 mod border;
 mod cut_planes;
 mod distance;
+mod distance_stats;
 mod errors;
 mod faithful;
 mod front;
@@ -27,8 +29,8 @@ mod geometry;
 mod joints;
 mod jpeg;
 mod lines;
-mod look;
-mod node_look;
+mod node_errors;
+mod node_textures;
 mod options;
 mod points;
 mod progress;
@@ -39,7 +41,8 @@ mod source;
 mod source_colors;
 mod step;
 mod structure;
-mod tally;
+mod surface_appearance;
+
 mod text;
 mod tiles;
 mod tree;
@@ -61,13 +64,13 @@ use assembly::Assembly;
 use distance::{FrontDistances, NodeDistances};
 use front::Front;
 use geometry::NodeGeometry;
-use node_look::NodePictures;
+use node_textures::NodeTextures;
 use points::Points;
 use source::Source;
 
-use crate::build::options::placement_of;
-use crate::build::quantize::Quantization;
 use crate::format::{SCENE_FILE, Scene};
+use crate::lattice::Quantization;
+use crate::place::placement_of;
 use crate::{Error, Result};
 
 /// Verifies the scene in `out` against the models that it was built from; without any, against
@@ -90,7 +93,7 @@ pub fn verify(
         leaves: None,
         levels: Vec::new(),
         front: None,
-        errors: None,
+        errors: Vec::new(),
         worst_nodes: Vec::new(),
         gaps: Vec::new(),
     };
@@ -146,10 +149,10 @@ impl Verification<'_> {
         let seams = rims.seams();
         cut_planes::mark(scene, &mut geometry, &seams, &steps);
         let points = Points::new(scene, &leaves, &geometry, options.samples, options.seed);
-        let pictures = NodePictures::new(out, scene);
+        let images = NodeTextures::new(out, scene);
 
-        progress.phase("pictures of the leaves", leaves.len() as u64);
-        let shown = appearance::leaf_colors(&leaves, &points, &pictures, || progress.done(1));
+        progress.phase("images of the leaves", leaves.len() as u64);
+        let shown = appearance::leaf_colors(&leaves, &points, &images, || progress.done(1));
         let reference = match &source {
             Some(source) => self.against_source(
                 source, &leaves, &geometry, &rims, &seams, &points, &steps, &shown, report,
@@ -161,7 +164,7 @@ impl Verification<'_> {
             &leaves,
             &geometry,
             &points,
-            &pictures,
+            &images,
             &steps,
             &shown,
             &reference,
@@ -192,7 +195,7 @@ impl Verification<'_> {
         seams: &[seams::Seam],
         points: &Points,
         steps: &[f64],
-        shown: &[Option<look::Color>],
+        shown: &[Option<surface_appearance::Color>],
         report: &mut VerifyReport,
     ) -> Reference {
         let Self { scene, options, progress, .. } = *self;
@@ -202,7 +205,7 @@ impl Verification<'_> {
         );
         report.checks.push(check);
         report.checks.push(joints::joints(scene, source, rims, steps));
-        progress.phase("pictures of the source", 1);
+        progress.phase("images of the source", 1);
         let quality = scene.parameters["jpeg_quality"].as_u64().unwrap_or(85).clamp(1, 100) as u8;
         figures.jpeg_rms = jpeg::jpeg_rms(source, quality);
         // Two roundings of half a step along three axes.
@@ -212,7 +215,7 @@ impl Verification<'_> {
         report.checks.push(check);
         let tiles = tiles::Tiles::find(source);
         let tile = tiles.map_or(Vec::new(), |tiles| {
-            colors.iter().map(|shown| shown.and_then(|shown| tiles.at(&shown.look))).collect()
+            colors.iter().map(|shown| shown.and_then(|shown| tiles.at(&shown.appearance))).collect()
         });
         let color = colors.into_iter().map(|shown| Some(shown?.color)).collect();
         let reference = Reference { color, tile };
@@ -234,9 +237,9 @@ impl Verification<'_> {
         leaves: &[u32],
         geometry: &[NodeGeometry],
         points: &Points,
-        pictures: &NodePictures,
+        images: &NodeTextures,
         steps: &[f64],
-        shown: &[Option<look::Color>],
+        shown: &[Option<surface_appearance::Color>],
         reference: &Reference,
         report: &mut VerifyReport,
     ) {
@@ -260,7 +263,7 @@ impl Verification<'_> {
                 &distances,
                 points,
                 geometry,
-                pictures,
+                images,
                 shown,
                 reference,
                 || {},
@@ -281,12 +284,18 @@ impl Verification<'_> {
             let deepest = front.nodes().map(|node| scene.nodes[node as usize].level).max();
             report.front = Some(measure(&front, deepest.unwrap_or(0)).0);
         }
-        let (figures, check) = errors::errors(scene, &all, steps, &options.limits);
+        progress.phase("errors of the nodes", all.len() as u64);
+        let errors = node_errors::node_errors(scene, leaves, geometry, progress);
+        let (figures, check) = errors::errors(scene, &errors, steps, &options.limits);
         report.errors = figures;
         report.checks.push(check);
-        all.sort_by(|a, b| b.max().total_cmp(&a.max()).then(a.node.cmp(&b.node)));
-        let worst = all.iter().take(options.worst);
-        report.worst_nodes = worst.map(|node| node_figures(scene, node, diagonal)).collect();
+        // Both hold every coarse node once.
+        all.sort_by_key(|measured| measured.node);
+        let mut worst: Vec<_> = all.iter().zip(&errors).collect();
+        worst.sort_by(|a, b| b.1.max().total_cmp(&a.1.max()).then(a.1.node.cmp(&b.1.node)));
+        let worst = worst.into_iter().take(options.worst);
+        report.worst_nodes =
+            worst.map(|(node, error)| node_figures(scene, node, error, diagonal)).collect();
     }
 
     fn level_figures(
@@ -333,21 +342,23 @@ fn facts(scene: &Scene, leaves: &[u32], geometry: &[NodeGeometry], steps: &[f64]
     }
 }
 
-fn node_figures(scene: &Scene, measured: &NodeDistances, diagonal: f64) -> NodeFigures {
+fn node_figures(
+    scene: &Scene,
+    measured: &NodeDistances,
+    error: &node_errors::NodeError,
+    diagonal: f64,
+) -> NodeFigures {
     let node = &scene.nodes[measured.node as usize];
-    let farther = if measured.to_front.max() >= measured.to_source.max() {
-        measured.to_front.farthest()
-    } else {
-        measured.to_source.farthest()
-    };
+    let (_, farthest) =
+        if error.to_node.0 >= error.to_original.0 { error.to_node } else { error.to_original };
     NodeFigures {
         id: node.id,
         file: node.file.clone(),
         level: node.level,
         geometric_error: node.geometric_error,
-        measured: measured.max(),
+        measured: error.max(),
         to_front: distance::figures(&measured.to_front, diagonal),
         to_source: distance::figures(&measured.to_source, diagonal),
-        farthest: farther.into(),
+        farthest: farthest.into(),
     }
 }

@@ -48,14 +48,15 @@ pub struct Limits {
     pub attribute: f64,
     /// Relative difference of the area of leaves and source, beside what rounding may change.
     pub area: f64,
-    /// Stored error over measured error, at most this in the median of the nodes; with a level
-    /// factor below 4 more, since bounds add up over more levels.
-    pub error_ratio: f64,
-    /// Colour error of the leaves (RMS, 0–255) over that of JPEG itself on the source's pictures.
+    /// Stored error over measured error, at most this in the median of the nodes of each level.
+    pub median_error_ratio: f64,
+    /// The same at the 95th percentile.
+    pub high_error_ratio: f64,
+    /// Colour error of the leaves (RMS, 0–255) over that of JPEG itself on the source's images.
     pub texel_ratio: f64,
     /// Added to that: rounding of texels and texture coordinates, 0–255.
     pub texel_slack: f64,
-    /// Likewise for a single leaf, whose pictures may be harder than the average.
+    /// Likewise for a single leaf, whose images may be harder than the average.
     pub leaf_texel_ratio: f64,
     /// Likewise, 0–255.
     pub leaf_texel_slack: f64,
@@ -73,7 +74,8 @@ impl Default for Limits {
         Self {
             attribute: 1e-9,
             area: 1e-6,
-            error_ratio: 4.0,
+            median_error_ratio: 1.3,
+            high_error_ratio: 2.0,
             texel_ratio: 1.5,
             texel_slack: 1.0,
             leaf_texel_ratio: 3.0,

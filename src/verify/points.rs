@@ -11,7 +11,7 @@ pub(super) struct Points {
     pub all: Vec<SurfacePoint>,
     /// The leaf of each.
     pub leaf: Vec<u32>,
-    /// Where each leaf's points begin, by place among the leaves, and where the last ones end.
+    /// Where each leaf's points begin, by index among the leaves, and where the last ones end.
     first: Vec<usize>,
     /// Points a square metre.
     pub density: f64,
@@ -39,8 +39,8 @@ impl Points {
         points
     }
 
-    /// The numbers of a leaf's points; the leaf by its place among the leaves.
-    pub fn of_leaf(&self, place: usize) -> std::ops::Range<usize> {
-        self.first[place]..self.first[place + 1]
+    /// The numbers of a leaf's points; the leaf by its index among the leaves.
+    pub fn of_leaf(&self, index: usize) -> std::ops::Range<usize> {
+        self.first[index]..self.first[index + 1]
     }
 }

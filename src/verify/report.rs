@@ -32,8 +32,8 @@ pub struct VerifyReport {
     pub levels: Vec<LevelFigures>,
     /// The front of mixed levels that was asked for; its `level` is that of its deepest node.
     pub front: Option<LevelFigures>,
-    /// Stored against measured errors; `None` where all nodes are leaves.
-    pub errors: Option<ErrorFigures>,
+    /// Stored against measured errors, by level; none where all nodes are leaves.
+    pub errors: Vec<ErrorFigures>,
     /// The nodes that are farthest from the source, worst first.
     pub worst_nodes: Vec<NodeFigures>,
     /// Widest gaps, for every pair of levels that meet somewhere; `a` ≤ `b`.
@@ -142,8 +142,8 @@ pub struct LeafFigures {
     pub color_samples: u64,
     /// RMS difference of their colours, 0–255.
     pub color_rms: f64,
-    /// The same for the source's pictures encoded and decoded again as the build does it; `None`
-    /// without pictures.
+    /// The same for the source's images encoded and decoded again as the build does it; `None`
+    /// without images.
     pub jpeg_rms: Option<f64>,
     /// Tiles of generated cities; `None` elsewhere.
     pub tiles: Option<TileFigures>,
@@ -206,9 +206,11 @@ pub struct Distance {
     pub max_relative: f64,
 }
 
-/// Stored against measured errors of the nodes that are no leaves.
+/// Stored against measured errors of the nodes of a level that are no leaves.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct ErrorFigures {
+    /// 0 is the roots'.
+    pub level: u32,
     /// Nodes that were compared.
     pub nodes: u64,
     /// Nodes whose stored error is below the measured one.

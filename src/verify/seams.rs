@@ -39,19 +39,19 @@ pub(super) struct RimEdge {
     uses: u32,
 }
 
-/// The edges of triangles that are not between just two of them. Vertices at one place are one.
+/// The edges of triangles that are not between just two of them. Vertices at one position are one.
 fn rim_of(
     positions: impl Iterator<Item = DVec3>,
     triangles: impl Iterator<Item = [u32; 3]>,
 ) -> Vec<RimEdge> {
     let mut numbers: FxHashMap<PositionKey<f64>, u32> = FxHashMap::default();
     numbers.reserve(positions.size_hint().0);
-    let mut places: Vec<DVec3> = Vec::new();
+    let mut corners: Vec<DVec3> = Vec::new();
     let welded: Vec<u32> = positions
         .map(|position| {
             *numbers.entry(key(position.to_array())).or_insert_with(|| {
-                places.push(position);
-                places.len() as u32 - 1
+                corners.push(position);
+                corners.len() as u32 - 1
             })
         })
         .collect();
@@ -66,7 +66,7 @@ fn rim_of(
         .chunk_by(|a, b| a == b)
         .filter(|same| same.len() != 2 && same[0][0] != same[0][1])
         .map(|same| {
-            let mut ends = same[0].map(|vertex| places[vertex as usize]);
+            let mut ends = same[0].map(|vertex| corners[vertex as usize]);
             let mut keys = ends.map(|end| key(end.to_array()));
             if keys[1] < keys[0] {
                 (keys, ends) = ([keys[1], keys[0]], [ends[1], ends[0]]);
@@ -116,8 +116,8 @@ impl<'a> Rims<'a> {
     pub fn seams(&self) -> Vec<Seam> {
         let mut seams = Vec::new();
         for same in self.equal() {
-            for (place, &(edge, a)) in same.iter().enumerate() {
-                let others = same[place + 1..].iter().filter(|&&(_, b)| a != b);
+            for (index, &(edge, a)) in same.iter().enumerate() {
+                let others = same[index + 1..].iter().filter(|&&(_, b)| a != b);
                 seams.extend(others.map(|&(_, b)| Seam { ends: edge.ends, leaves: [a, b] }));
             }
         }
@@ -156,6 +156,7 @@ mod tests {
                 [from, 1.0, 0.0],
             ],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
+            skirts: Vec::new(),
             in_cut_plane: Vec::new(),
         }
     }

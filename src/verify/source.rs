@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::look::Look;
 use super::progress::Progress;
 use super::seams::open_edges;
-use crate::build::quantize::Quantization;
+use super::surface_appearance::SurfaceAppearance;
 use crate::import::{find_inputs, load};
+use crate::lattice::Quantization;
 use crate::mesh::Surface;
 use crate::mesh::{Model, TextureSource, UpAxis};
 use crate::place::Placement;
@@ -23,8 +23,8 @@ pub(super) struct Source {
     rounded: Option<Surface>,
     models: Vec<Model>,
     parts: Vec<PartPlace>,
-    /// Number of each model's first picture.
-    first_picture: Vec<u32>,
+    /// Number of each model's first image.
+    first_texture: Vec<u32>,
 }
 
 /// Where the triangles of a part begin among all.
@@ -47,7 +47,7 @@ impl Source {
         let inputs = find_inputs(arguments)?;
         progress.phase("reading the source", inputs.len() as u64 + 1);
         let (mut positions, mut triangles): (Vec<DVec3>, Vec<[u32; 3]>) = Default::default();
-        let (mut models, mut parts, mut first_picture) = (Vec::new(), Vec::new(), vec![0]);
+        let (mut models, mut parts, mut first_texture) = (Vec::new(), Vec::new(), vec![0]);
         for input in &inputs {
             let mut model = load(input)?;
             placement.localise(&mut model, up)?;
@@ -67,13 +67,13 @@ impl Source {
                     return Err(Error::input(input, "more triangles than can be verified at once"));
                 }
             }
-            first_picture.push(first_picture[models.len()] + model.textures.len() as u32);
+            first_texture.push(first_texture[models.len()] + model.textures.len() as u32);
             models.push(model);
             progress.done(1);
         }
         let surface = Surface::new(positions, triangles);
         progress.done(1);
-        Ok(Self { surface, rounded: None, models, parts, first_picture })
+        Ok(Self { surface, rounded: None, models, parts, first_texture })
     }
 
     /// Makes it known on what lattice the scene lies.
@@ -96,11 +96,11 @@ impl Source {
     /// The edges at which each model ends, model by model: those that touch are not one surface.
     pub fn open_edges(&self) -> Vec<[DVec3; 2]> {
         let first = |model: u32| {
-            let place = self.parts.partition_point(|place| place.model < model);
+            let range = self.parts.partition_point(|range| range.model < model);
             self.parts
-                .get(place)
-                .map_or((self.surface.positions().len(), self.surface.triangles().len()), |place| {
-                    (place.first_vertex as usize, place.first_triangle as usize)
+                .get(range)
+                .map_or((self.surface.positions().len(), self.surface.triangles().len()), |range| {
+                    (range.first_vertex as usize, range.first_triangle as usize)
                 })
         };
         let models: Vec<u32> = (0..self.models.len() as u32).collect();
@@ -119,14 +119,14 @@ impl Source {
     }
 
     /// How the surface looks at a point of a triangle.
-    pub fn look(&self, triangle: u32, weights: [f64; 3]) -> Look {
-        let place = self.parts.partition_point(|place| place.first_triangle <= triangle) - 1;
-        let place = &self.parts[place];
-        let model = &self.models[place.model as usize];
-        let part = &model.parts[place.part as usize];
+    pub fn appearance(&self, triangle: u32, weights: [f64; 3]) -> SurfaceAppearance {
+        let range = self.parts.partition_point(|range| range.first_triangle <= triangle) - 1;
+        let range = &self.parts[range];
+        let model = &self.models[range.model as usize];
+        let part = &model.parts[range.part as usize];
         let material = &model.materials[part.material as usize];
         let corners = self.surface.triangles()[triangle as usize]
-            .map(|vertex| (vertex - place.first_vertex) as usize);
+            .map(|vertex| (vertex - range.first_vertex) as usize);
         let mut factor: [f64; 3] = std::array::from_fn(|i| f64::from(material.base_color[i]));
         if !part.colors.is_empty() {
             let colors = corners.map(|vertex| part.colors[vertex]);
@@ -135,22 +135,22 @@ impl Source {
                 *factor *= value / 65535.0;
             }
         }
-        let picture = material
+        let image = material
             .texture
             .filter(|_| !part.texcoords.is_empty())
-            .map(|texture| self.first_picture[place.model as usize] + texture);
-        let texcoord = match picture {
+            .map(|texture| self.first_texture[range.model as usize] + texture);
+        let texcoord = match image {
             Some(_) => std::array::from_fn(|axis| {
                 let at = |i: usize| f64::from(part.texcoords[corners[i]][axis]);
                 (0..3).map(|i| weights[i] * at(i)).sum()
             }),
             None => [0.0; 2],
         };
-        Look { picture, texcoord, wrap: material.wrap, alpha: material.alpha, factor }
+        SurfaceAppearance { image, texcoord, wrap: material.wrap, alpha: material.alpha, factor }
     }
 
-    /// All pictures, by number.
-    pub fn pictures(&self) -> impl Iterator<Item = (u32, &TextureSource)> {
+    /// All images, by number.
+    pub fn images(&self) -> impl Iterator<Item = (u32, &TextureSource)> {
         (0..).zip(self.models.iter().flat_map(|model| &model.textures))
     }
 }

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::tree::line;
-use crate::build::lattice::Lattice;
-use crate::build::quantize::Quantization;
 use crate::format::Scene;
+use crate::lattice::Lattice;
+use crate::lattice::Quantization;
 
 /// For each node the step of its lattice in metres. Source coordinates are rounded to multiples of
 /// it: by half a step at most along each axis.

@@ -9,14 +9,15 @@ use super::geometry::NodeGeometry;
 use super::options::Limits;
 use super::progress::Progress;
 use super::report::{Check, Failure};
-use crate::build::attributes::{TEXTURED_WEIGHT, attributes};
-use crate::build::options::placement_of;
+use crate::decode::texture_size;
+use crate::format::TILESET_FILE;
+use crate::format::attributes::{TEXTURED_WEIGHT, attributes};
 use crate::format::{
     NODES_DIR, Node, NodeImageData, NodeMesh, Scene, TEXTURES_DIR, file_crc, read_glb,
 };
-use crate::import::texture_size;
 use crate::mesh::{TextureData, TextureSource};
-use crate::tileset::{self, TILESET_FILE};
+use crate::place::placement_of;
+use crate::tileset;
 
 const REBUILD: &str = "build the scene again with --force";
 const REPORT: &str = "build again with --force; if it stays, this is a fault of the builder";
@@ -60,7 +61,7 @@ pub(super) fn structure(
     check.extend(tree_failures(scene));
     let tiles = tileset_failures(out, scene, &mut check);
     check.summary = format!(
-        "{} nodes and {} shared pictures read, checksums and {ATTRIBUTES} attributes each; {tiles}",
+        "{} nodes and {} shared images read, checksums and {ATTRIBUTES} attributes each; {tiles}",
         scene.nodes.len(),
         scene.shared_textures.len(),
     );
@@ -96,7 +97,7 @@ fn tileset_failures(out: &Path, scene: &Scene, check: &mut Check) -> String {
     }
 }
 
-/// Attributes that [`attribute_failures`] looks at.
+/// Attributes that [`attribute_failures`] checks.
 const ATTRIBUTES: usize = 13;
 
 fn read_node(
@@ -159,16 +160,16 @@ fn attribute_failures(
     whole("triangles", node.triangles.into(), found.triangles.into());
     whole("textured triangles", node.textured_triangles.into(), found.textured_triangles.into());
     whole("vertices", node.vertices.into(), found.vertices.into());
-    let mut pictures = Vec::new();
+    let mut images = Vec::new();
     let mut shared = Vec::new();
     let mut shared_texels = 0;
     for image in &mesh.images {
         let texels = u64::from(image.width) * u64::from(image.height);
         match &image.data {
             NodeImageData::Embedded { bytes, .. } => {
-                pictures.push([image.width, image.height]);
+                images.push([image.width, image.height]);
                 if let Some(what) = size_failure(bytes, [image.width, image.height]) {
-                    compare("picture", "its size".into(), what, false);
+                    compare("image", "its size".into(), what, false);
                 }
             }
             NodeImageData::Shared { file_name } => {
@@ -177,18 +178,18 @@ fn attribute_failures(
             }
         }
     }
-    let texels = pictures.iter().map(|&[w, h]| u64::from(w) * u64::from(h)).sum::<u64>();
+    let texels = images.iter().map(|&[w, h]| u64::from(w) * u64::from(h)).sum::<u64>();
     let mut whole = |name: &str, stored: u64, recomputed: u64| {
         compare(name, stored.to_string(), recomputed.to_string(), stored == recomputed);
     };
     whole("texels", node.texels, texels);
     whole("shared texels", node.shared_texels, shared_texels);
-    let stored_pictures = &node.pictures;
+    let stored_images = &node.pictures;
     compare(
         "pictures",
-        format!("{stored_pictures:?}"),
-        format!("{pictures:?}"),
-        *stored_pictures == pictures,
+        format!("{stored_images:?}"),
+        format!("{images:?}"),
+        *stored_images == images,
     );
     shared.sort_unstable();
     let mut stored_shared: Vec<String> = node
@@ -200,7 +201,7 @@ fn attribute_failures(
     stored_shared.sort_unstable();
     shared.dedup();
     let same = stored_shared == shared;
-    compare("shared pictures", stored_shared.join(", "), shared.join(", "), same);
+    compare("shared images", stored_shared.join(", "), shared.join(", "), same);
     let mut triple = |name: &str, stored: [f64; 3], recomputed: [f64; 3], tolerance: f64| {
         let same = stored.iter().zip(recomputed).all(|(a, b)| (a - b).abs() <= tolerance);
         compare(name, format!("{stored:?}"), format!("{recomputed:?}"), same);
@@ -217,19 +218,23 @@ fn attribute_failures(
     failures
 }
 
-/// Why encoded bytes are no picture of a size.
+/// Why encoded bytes are no image of a size.
 fn size_failure(bytes: &[u8], size: [u32; 2]) -> Option<String> {
     let source = TextureSource {
-        name: "picture".into(),
+        name: "image".into(),
         data: TextureData::Embedded(bytes.into()),
         opacity: None,
     };
     match texture_size(&source) {
         Ok((width, height)) if [width, height] == size => None,
-        Ok(found) => Some(format!("expected a picture of {size:?} texels, found {found:?}")),
+        Ok(found) => Some(format!("expected an image of {size:?} texels, found {found:?}")),
         Err(error) => Some(error.to_string()),
     }
 }
+
+/// A skirt that stands for several spans of a border reaches no more than so many times as far from
+/// the source as the border.
+const SKIRT_REACH: f64 = 2.5;
 
 /// Nodes that stick out of their parent's box, and errors that grow towards the leaves.
 fn tree_failures(scene: &Scene) -> Vec<Failure> {
@@ -252,8 +257,9 @@ fn tree_failures(scene: &Scene) -> Vec<Failure> {
                     .max(node.bbox_max[axis] - parent.bbox_max[axis])
             })
             .fold(0.0, f64::max);
+        // Each is as near to the source as its own error says, its skirts as SKIRT_REACH times that.
         // Corners of leaves lie on the lattice, those of coarse nodes between its points.
-        if beyond > parent.geometric_error + step {
+        if beyond > parent.geometric_error + SKIRT_REACH * node.geometric_error + step {
             fail(format!(
                 "reaches {beyond:.4} m out of its parent's box, whose error is {:.4} m",
                 parent.geometric_error

@@ -1,14 +1,14 @@
 //! The numbered tiles of generated cities, where the source is one: misplaced texels show another
 //! number.
 
-use super::look::{Color, Look};
 use super::report::TileFigures;
 use super::source::Source;
+use super::surface_appearance::{Color, SurfaceAppearance};
 use crate::city::{TileCode, TileGrid};
-use crate::import::{Picture, decode_texture};
+use crate::decode::{DecodedTexture, decode_texture};
 use crate::mesh::{TextureData, TextureSource};
 
-/// Places of a picture, along each side, at which its own tiles are read to know it as one.
+/// Places of an image, along each side, at which its own tiles are read to know it as one.
 const PROBES: u32 = 40;
 /// Share of these that must read right.
 const READABLE: f64 = 0.98;
@@ -16,7 +16,7 @@ const READABLE: f64 = 0.98;
 /// filter, one for the average that made the texel, one for chroma, which JPEG halves.
 const CLEAR_TEXELS: f64 = 3.0;
 
-/// The tiles of each picture of the source, where it has them.
+/// The tiles of each image of the source, where it has them.
 pub(super) struct Tiles(Vec<Option<(TileGrid, TileCode)>>);
 
 /// A tile that a point shows.
@@ -30,21 +30,21 @@ pub(super) struct Tile {
 }
 
 impl Tiles {
-    /// Finds the tiles of the source's pictures; `None` where no picture has any.
+    /// Finds the tiles of the source's images; `None` where no image has any.
     pub fn find(source: &Source) -> Option<Self> {
-        let tiles: Vec<_> = source.pictures().map(|(_, picture)| tiles_of(picture)).collect();
+        let tiles: Vec<_> = source.images().map(|(_, image)| tiles_of(image)).collect();
         tiles.iter().any(Option::is_some).then_some(Self(tiles))
     }
 
     /// The tile at a point of the source.
-    pub fn at(&self, look: &Look) -> Option<Tile> {
-        let (grid, code) = self.0.get(look.picture? as usize)?.as_ref()?;
-        let sample = grid.at(look.texcoord)?;
+    pub fn at(&self, appearance: &SurfaceAppearance) -> Option<Tile> {
+        let (grid, code) = self.0.get(appearance.image? as usize)?.as_ref()?;
+        let sample = grid.at(appearance.texcoord)?;
         Some(Tile { number: sample.tile, clearance: sample.clearance, code: *code })
     }
 }
 
-/// The tiles of a picture that a city's block has: its name ends in the block's number, and its
+/// The tiles of an image that a city's block has: its name ends in the block's number, and its
 /// texels show what the tiles at their place should.
 fn tiles_of(source: &TextureSource) -> Option<(TileGrid, TileCode)> {
     let name = match &source.data {
@@ -57,8 +57,8 @@ fn tiles_of(source: &TextureSource) -> Option<(TileGrid, TileCode)> {
         stem[tail..].to_owned()
     };
     let block: usize = digits.parse().ok()?;
-    let picture = decode_texture(source).ok()?;
-    let grid = TileGrid::new([picture.width, picture.height]);
+    let image = decode_texture(source).ok()?;
+    let grid = TileGrid::new([image.width, image.height]);
     let code = TileCode::new(block);
     let (mut probes, mut right) = (0u32, 0u32);
     for x in 0..PROBES {
@@ -68,17 +68,17 @@ fn tiles_of(source: &TextureSource) -> Option<(TileGrid, TileCode)> {
                 continue;
             };
             probes += 1;
-            right += u32::from(code.tile(texel(&picture, texcoord)) == Some(sample.tile));
+            right += u32::from(code.tile(texel(&image, texcoord)) == Some(sample.tile));
         }
     }
     (probes > 0 && f64::from(right) >= READABLE * f64::from(probes)).then_some((grid, code))
 }
 
-fn texel(picture: &Picture, texcoord: [f64; 2]) -> [u8; 3] {
-    let x = ((texcoord[0] * f64::from(picture.width)) as u32).min(picture.width - 1);
-    let y = ((texcoord[1] * f64::from(picture.height)) as u32).min(picture.height - 1);
-    let at = (y as usize * picture.width as usize + x as usize) * usize::from(picture.channels);
-    [0, 1, 2].map(|channel| picture.pixels[at + channel])
+fn texel(image: &DecodedTexture, texcoord: [f64; 2]) -> [u8; 3] {
+    let x = ((texcoord[0] * f64::from(image.width)) as u32).min(image.width - 1);
+    let y = ((texcoord[1] * f64::from(image.height)) as u32).min(image.height - 1);
+    let at = (y as usize * image.width as usize + x as usize) * usize::from(image.channels);
+    [0, 1, 2].map(|channel| image.pixels[at + channel])
 }
 
 /// Counts what a node shows where the source shows `tile`; `scale` is the width of the node's

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use assert_cmd::Command;
-use hlod::build::BuildOptions;
-use hlod::build::hierarchy::HierarchyOptions;
+use hlod::builder::BuildOptions;
+use hlod::builder::hierarchy::HierarchyOptions;
 use hlod::camera::{Ground, PathKind, make_path, write_path};
 use hlod::format::Scene;
 use serde_json::Value;

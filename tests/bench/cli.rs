@@ -53,7 +53,7 @@ fn help_names_every_option_with_its_unit_and_range() {
         "milliseconds that a frame may take, above 0 [default: 30]",
         "0-1",
         "Seconds by which",
-        "Metres;",
+        "in metres, above 0",
         "KiB, MiB or GiB [default: 1GiB]",
         "[default: 64KiB]",
         "in pixels [default: 1280x720]",

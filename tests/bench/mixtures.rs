@@ -8,6 +8,7 @@ use hlod::bench::{Accuracy, Reference, Session, Sighting, Witness};
 use hlod::camera::{Ground, PathKind, Pose, View, from_angles, make_path};
 use hlod::city::{CityOptions, TextureSize};
 use hlod::mesh::UpAxis;
+use hlod::random::Random;
 use hlod::render::RenderOptions;
 use hlod::runtime::SceneTree;
 
@@ -53,14 +54,14 @@ fn poses(session: &Session, out: &Path) -> Vec<Pose> {
 
 /// Looking at some node from 3 to 100 m away and from any side but below, outside of all blocks.
 fn close_ups(tree: &SceneTree, count: usize) -> Vec<Pose> {
-    let mut random = random(9);
+    let mut random = Random::new(9, 0);
     let mut poses = Vec::new();
     while poses.len() < count {
-        let node = ((random() * tree.len() as f64) as u32).min(tree.len() as u32 - 1);
+        let node = ((random.unit() * tree.len() as f64) as u32).min(tree.len() as u32 - 1);
         let [low, high] = tree.node(node).bbox;
-        let (yaw, pitch) = (random() * 360.0, -60.0 * random());
+        let (yaw, pitch) = (random.unit() * 360.0, -60.0 * random.unit());
         let rotation = from_angles(UpAxis::Z, yaw, pitch, 0.0);
-        let away = 3.0 * 33f64.powf(random());
+        let away = 3.0 * 33f64.powf(random.unit());
         let position = (low + high) / 2.0 - rotation * DVec3::NEG_Z * away;
         let inside = |&root: &u32| {
             let [low, high] = tree.node(root).bbox;
@@ -91,15 +92,6 @@ fn front(tree: &SceneTree, mut stop: impl FnMut(&[u32]) -> bool) -> Vec<u32> {
     front
 }
 
-/// A fixed sequence of numbers in 0–1.
-fn random(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((state >> 33) as f64) / (1u64 << 31) as f64
-    }
-}
-
 /// Fronts with neighbours as different as can be, random ones, and one level alone.
 fn fronts(tree: &SceneTree) -> Vec<(String, Vec<u32>)> {
     let mut fronts = vec![("the roots".to_owned(), front(tree, |_| true))];
@@ -113,8 +105,8 @@ fn fronts(tree: &SceneTree) -> Vec<(String, Vec<u32>)> {
         fronts.push((format!("checkerboard {parity}"), front(tree, checkerboard)));
     }
     for (share, seed) in [(0.2, 1), (0.4, 2), (0.6, 3)] {
-        let mut random = random(seed);
-        fronts.push((format!("random {share}"), front(tree, |_| random() < share)));
+        let mut random = Random::new(seed, 0);
+        fronts.push((format!("random {share}"), front(tree, |_| random.unit() < share)));
     }
     fronts
 }

@@ -198,7 +198,7 @@ impl Rig {
 
 /// Frames in which priorities stay for a while and then jump; what happened.
 fn storm(session: &Session, nodes: Option<u64>, portion_bytes: u64, seed: u64) -> Counters {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed, 0);
     let upload_bytes = random.pick(&[0, 20_000, 1 << 22]);
     let evict_margin = random.pick(&[0.0, 0.1]);
     let options =
@@ -210,7 +210,7 @@ fn storm(session: &Session, nodes: Option<u64>, portion_bytes: u64, seed: u64) -
             salt = random.bits();
         }
         rig.frame(|node| {
-            let mut of_node = Random(salt ^ u64::from(node).wrapping_mul(0x9e37_79b9));
+            let mut of_node = Random::new(salt, u64::from(node));
             (of_node.below(5) > 0).then(|| of_node.unit())
         });
         std::thread::sleep(Duration::from_micros(random.bits() % 400));

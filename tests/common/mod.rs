@@ -5,24 +5,16 @@ pub mod rays;
 
 use std::sync::Mutex;
 
-use hlod::build::border::Border;
-use hlod::build::cut::Piece;
-use hlod::build::hierarchy::{
-    BlockBuilder, HierarchyOptions, NodeDraft, NodeSink, Tree, simplifications,
+use hlod::builder::border::vertex::Border;
+use hlod::builder::cut::split::Chunk;
+use hlod::builder::hierarchy::{
+    BlockBuilder, HierarchyOptions, NodeDraft, NodeSink, Resolutions, Tree,
 };
-use hlod::build::lattice::Lattice;
-use hlod::build::simplify::LadderStep;
+use hlod::builder::simplify::ladder::LadderStep;
+use hlod::lattice::Lattice;
 use hlod::mesh::{Mesh, PositionKey, key};
-
-/// A fixed sequence of numbers in 0–1.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) as f64) / (1u64 << 31) as f64
-    }
-}
+pub use hlod::random::Random;
+use hlod::texture::BakePlan;
 
 /// A closed surface: a cube's faces as grids of `n` by `n` quads, each vertex where `place` puts
 /// its grid point, whose coordinates run from -1 to 1.
@@ -64,23 +56,23 @@ fn blown_up(n: usize, mut place: impl FnMut(glam::DVec3) -> glam::DVec3) -> Mesh
 
 /// A closed bumpy ball: a cube's faces as grids of `n` by `n` quads, blown up.
 pub fn ball(n: usize, radius: f64, bump: f64, seed: u64) -> Mesh<f64> {
-    let mut random = Random(seed);
-    blown_up(n, |p| p.normalize() * radius * (1.0 + bump * (random.next() - 0.5)))
+    let mut random = Random::new(seed, 0);
+    blown_up(n, |p| p.normalize() * radius * (1.0 + bump * (random.unit() - 0.5)))
 }
 
-/// A closed bumpy slab, like a piece of ground with its underside.
+/// A closed bumpy slab, like a chunk of ground with its underside.
 pub fn slab(n: usize, half_size: [f64; 3], bump: f64, seed: u64) -> Mesh<f64> {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed, 0);
     blown_up(n, |p| {
-        let noise: [f64; 3] = std::array::from_fn(|_| bump * (random.next() - 0.5));
+        let noise: [f64; 3] = std::array::from_fn(|_| bump * (random.unit() - 0.5));
         p * glam::DVec3::from(half_size) + glam::DVec3::from(noise)
     })
 }
 
 /// An open, textured, bumpy wall of `n` by `m` quads, two charts side by side, with holes.
 pub fn wall(n: usize, m: usize, seed: u64) -> Mesh<f64> {
-    let mut random = Random(seed);
-    let heights: Vec<f64> = (0..(n + 1) * (m + 1)).map(|_| random.next() * 0.03).collect();
+    let mut random = Random::new(seed, 0);
+    let heights: Vec<f64> = (0..(n + 1) * (m + 1)).map(|_| random.unit() * 0.03).collect();
     let mut mesh = Mesh::<f64>::default();
     for chart in 0..2 {
         let (from, to) = if chart == 0 { (0, n / 2) } else { (n / 2, n) };
@@ -96,7 +88,7 @@ pub fn wall(n: usize, m: usize, seed: u64) -> Mesh<f64> {
         for i in 0..to - from {
             for j in 0..m {
                 let at = |i: usize, j: usize| first + (i * (m + 1) + j) as u32;
-                if random.next() < 0.01 {
+                if random.unit() < 0.01 {
                     continue;
                 }
                 mesh.triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
@@ -107,27 +99,87 @@ pub fn wall(n: usize, m: usize, seed: u64) -> Mesh<f64> {
     mesh
 }
 
+/// An open sheet of `n` by `n` quads of 0.1 m, as bumpy as hills: every upright line meets it once.
+pub fn hills(n: usize, seed: u64) -> Mesh<f64> {
+    let mut random = Random::new(seed, 0);
+    let mut mesh = Mesh::<f64>::default();
+    for i in 0..=n {
+        for j in 0..=n {
+            let [x, y] = [i, j].map(|at| at as f64 * 0.1);
+            let z = 0.6 * (1.3 * x).sin() * (0.9 * y).cos() + 0.06 * random.unit();
+            mesh.positions.push([x, y, z]);
+            mesh.materials.push(0);
+        }
+    }
+    for i in 0..n {
+        for j in 0..n {
+            let [a, b] = [i * (n + 1) + j, (i + 1) * (n + 1) + j].map(|at| at as u32);
+            mesh.triangles.extend([[a, b, b + 1], [a, b + 1, a + 1]]);
+        }
+    }
+    mesh
+}
+
+/// The mesh with a texture in charts by where triangles lie, squares of `side` on the least inclined
+/// plane; each chart of one of `materials` materials. Vertices between charts are there twice.
+pub fn in_charts(mesh: &Mesh<f64>, side: f64, materials: u32) -> Mesh<f64> {
+    let mut result = Mesh::<f64>::default();
+    let mut numbers = std::collections::BTreeMap::new();
+    for triangle in &mesh.triangles {
+        let corners = triangle.map(|vertex| glam::DVec3::from(mesh.positions[vertex as usize]));
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).to_array();
+        let axis = (0..3).max_by(|&a, &b| normal[a].abs().total_cmp(&normal[b].abs())).unwrap();
+        let along = [(axis + 1) % 3, (axis + 2) % 3];
+        let middle = corners.iter().sum::<glam::DVec3>() / 3.0;
+        let square = along.map(|axis| (middle[axis] / side).floor() as i64);
+        let chart = (axis, normal[axis] > 0.0, square);
+        let material = (axis as i64 + square[0] + square[1]).rem_euclid(materials.into()) as u32;
+        result.triangles.push(triangle.map(|vertex| {
+            *numbers.entry((vertex, chart)).or_insert_with(|| {
+                let position = mesh.positions[vertex as usize];
+                result.positions.push(position);
+                result.texcoords.push(along.map(|axis| (position[axis] / 64.0 + 0.5) as f32));
+                result.materials.push(material);
+                result.positions.len() as u32 - 1
+            })
+        }));
+    }
+    result
+}
+
 /// A gathered mesh as a block at the origin.
-pub fn block(mesh: Mesh<f64>) -> (Piece, Lattice) {
+pub fn block(mesh: Mesh<f64>) -> (Chunk, Lattice) {
     let (low, high) = mesh.bounds().unwrap();
     let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
     let lattice = Lattice::for_extent(extent, extent);
     let border = Border::interior(mesh.positions.len());
-    let piece = Piece { mesh, border, ..Piece::default() };
-    (hlod::build::gather::localise(piece, [0.0; 3], lattice, false).0, lattice)
+    let chunk = Chunk { mesh, border, ..Chunk::default() };
+    (hlod::builder::blocks::gather::localise(chunk, [0.0; 3], lattice, false).0, lattice)
 }
 
 /// A node as the sink saw it.
 #[derive(Clone, Debug)]
 pub struct Kept {
     pub mesh: Mesh,
-    pub skirts: Vec<hlod::build::skirt::Skirt>,
+    pub skirts: Vec<hlod::builder::border::skirt::Skirt>,
     pub level: usize,
-    pub place: Vec<u32>,
+    pub child_path: Vec<u32>,
     pub budget: usize,
     pub error: f64,
     pub step: LadderStep,
     pub locked: usize,
+}
+
+impl Kept {
+    pub fn is_leaf(&self) -> bool {
+        self.step == LadderStep::Original
+    }
+}
+
+/// The nodes of a level and the leaves above it.
+pub fn at_level(nodes: &[Kept], level: usize) -> Vec<&Kept> {
+    let of = |node: &&Kept| node.level == level || node.level < level && node.is_leaf();
+    nodes.iter().filter(of).collect()
 }
 
 /// Keeps all nodes.
@@ -141,10 +193,10 @@ impl NodeSink for MemorySink {
         self.0.lock().unwrap().push(Kept {
             mesh: node.mesh.clone(),
             skirts: node.skirts.to_vec(),
-            level: node.level,
-            place: node.place.to_vec(),
+            level: node.level(),
+            child_path: node.child_path.to_vec(),
             budget: node.budget,
-            error: node.geometric_error,
+            error: node.error.bound,
             step: node.step,
             locked: node.locked,
         });
@@ -153,23 +205,32 @@ impl NodeSink for MemorySink {
 }
 
 /// Builds a block in memory; nodes sorted by level and place.
-pub fn build(piece: Piece, lattice: Lattice, options: &HierarchyOptions) -> Vec<Kept> {
+pub fn build(chunk: Chunk, lattice: Lattice, options: &HierarchyOptions) -> Vec<Kept> {
+    build_baked(chunk, lattice, options, None)
+}
+
+/// Builds a block in memory whose coarse nodes are given textures of their own as `bake` says.
+pub fn build_baked(
+    chunk: Chunk,
+    lattice: Lattice,
+    options: &HierarchyOptions,
+    bake: Option<BakePlan>,
+) -> Vec<Kept> {
     let sink = MemorySink::default();
-    let factors = simplifications(piece.mesh.triangles.len(), options);
     let builder = BlockBuilder {
         options,
-        factors,
-        bake: None,
+        resolutions: Resolutions::new(chunk.mesh.triangles.len(), options),
+        bake,
         lattice,
         quantization: None,
         up: hlod::mesh::UpAxis::Z,
-        turnable: &[true],
+        reorientable: &[true; 8],
         sink: &sink,
         stages: &Default::default(),
     };
-    let _tree: Tree<()> = builder.build(piece).unwrap();
+    let _tree: Tree<()> = builder.build(chunk).unwrap();
     let mut nodes = sink.0.into_inner().unwrap();
-    nodes.sort_by(|a, b| (a.level, &a.place).cmp(&(b.level, &b.place)));
+    nodes.sort_by(|a, b| (a.level, &a.child_path).cmp(&(b.level, &b.child_path)));
     nodes
 }
 

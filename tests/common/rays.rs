@@ -78,6 +78,11 @@ impl Soup {
         })
     }
 
+    /// Whether a point is no farther from some triangle than `near`.
+    pub fn is_near(&self, point: DVec3, near: f64) -> bool {
+        self.distance(point, near) <= near
+    }
+
     /// The distance from a point to the nearest triangle, or something not above `enough` where it
     /// is at most that.
     fn distance(&self, point: DVec3, enough: f64) -> f64 {

@@ -332,6 +332,8 @@ fn inspect_shows_a_result_to_people_and_to_programs() {
     let further = [
         "first_child",
         "next_sibling",
+        "mean_error",
+        "p95_error",
         "shared_texels",
         "origin",
         "shared_textures",

@@ -71,7 +71,7 @@ fn a_killed_build_leaves_a_whole_result() {
     assert!(difference(&results[0], &results[1]).is_some());
     let inputs_before = contents(folder.path());
 
-    let mut random = Random(20);
+    let mut random = Random::new(20, 0);
     let mut now = 1;
     let (mut old, mut new, mut unfinished) = (0, 0, 0);
     for kill in 0..KILLS {

@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hlod::build::BuildOptions;
-use hlod::build::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
-use hlod::build::pipeline::with_threads;
-use hlod::build::simplify::Simplifier;
+use hlod::builder::BuildOptions;
+use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
+use hlod::builder::pipeline::with_threads;
+use hlod::builder::simplify::ladder::Simplifier;
 
 use crate::support::inputs::{small_city, write_city, write_soup, write_street};
 use crate::support::result::{difference, lasting};

@@ -91,7 +91,16 @@ fn a_tree_of_the_default_way() {
 fn a_tree_of_the_thesis_way() {
     check(
         "tiny_city_original_locked",
-        &["--desired-tris", "150", "--simplify-from", "original", "--borders", "locked"],
+        &[
+            "--desired-tris",
+            "150",
+            "--tree",
+            "thesis",
+            "--simplify-from",
+            "original",
+            "--borders",
+            "locked",
+        ],
     );
 }
 

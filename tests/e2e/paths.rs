@@ -1,9 +1,10 @@
 //! Camera paths over built scenes: nobody passes through a surface.
 
+use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use hlod::build::BuildOptions;
+use hlod::builder::BuildOptions;
 use hlod::camera::{CameraPath, Ground, PathKind, make_path, read_path, up_vector, write_path};
 use hlod::city::{self, CityOptions};
 
@@ -11,14 +12,6 @@ use crate::support::build_with;
 use crate::support::geometry::Triangle;
 use crate::support::result::Built;
 
-const KINDS: [PathKind; 6] = [
-    PathKind::Walk,
-    PathKind::Drive,
-    PathKind::Fly,
-    PathKind::Orbit,
-    PathKind::Still,
-    PathKind::Shake,
-];
 /// Frames from one place that is looked at to the next.
 const STRIDE: usize = 6;
 
@@ -65,7 +58,7 @@ fn check_city(options: &CityOptions, name: &str) {
     city::write(options, &input).unwrap();
     let (built, ground, triangles) = build(input, &folder.path().join("out"));
     let sky = up_vector(built.scene.up);
-    for kind in KINDS {
+    for kind in PathKind::value_variants().iter().copied() {
         let path = make_path(&ground, kind, kind.default_frames(), 30.0, 1).unwrap();
         assert_eq!(crossings(&path, &triangles), 0, "{name} {kind:?}");
         // The ground is below and no roof above, at the ends of long lines up and down.

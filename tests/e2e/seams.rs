@@ -4,9 +4,9 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hlod::build::BuildOptions;
-use hlod::build::hierarchy::HierarchyOptions;
-use hlod::build::pipeline::with_threads;
+use hlod::builder::BuildOptions;
+use hlod::builder::hierarchy::HierarchyOptions;
+use hlod::builder::pipeline::with_threads;
 use hlod::texture::Seams;
 
 use crate::support::result::{difference, lasting};

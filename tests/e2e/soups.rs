@@ -6,11 +6,11 @@ use std::fmt::Write;
 use std::path::Path;
 
 use glam::DVec3;
-use hlod::build::blocks::BlockMode;
-use hlod::build::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
-use hlod::build::progress::Silent;
-use hlod::build::simplify::Simplifier;
-use hlod::build::{BuildOptions, build};
+use hlod::builder::blocks::plan::BlockMode;
+use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
+use hlod::builder::progress::Silent;
+use hlod::builder::simplify::ladder::Simplifier;
+use hlod::builder::{BuildOptions, build};
 
 use crate::support::Random;
 use crate::support::geometry::{Triangle, area};
@@ -40,7 +40,7 @@ impl Soup {
         let groups = 1 + random.below(4);
         let each = 3 + random.below(30);
         let point = |random: &mut Random, size: f64| -> [f64; 3] {
-            std::array::from_fn(|axis| place[axis] + random.within(0.0, size))
+            std::array::from_fn(|axis| place[axis] + random.between(0.0, size))
         };
         let groups = (0..groups)
             .map(|_| {
@@ -191,7 +191,7 @@ struct Tally {
 }
 
 fn check_soup(seed: u64, folder: &Path, out: &Path, tally: &mut Tally) {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed, 0);
     let soup = Soup::new(&mut random);
     let input = write(folder, "soup.obj", soup.obj(&mut random));
     let options = random_options(&mut random);
@@ -208,7 +208,7 @@ fn check_soup(seed: u64, folder: &Path, out: &Path, tally: &mut Tally) {
     tally.built += 1;
     tally.nodes += built.scene.nodes.len();
     check_area(&what, &built, &surface, source_area);
-    check_budgets(&what, &built, out, &options, surface.len(), &mut tally.over_budget);
+    check_budgets(&what, &built, out, &options, &mut tally.over_budget);
 }
 
 /// Corners move by half a step of the lattice along each axis at most, and the area with them.
@@ -229,14 +229,12 @@ fn check_area(what: &str, built: &Built, surface: &[Triangle], source_area: f64)
     );
 }
 
-/// A node's budget is its piece's triangles over its level's factor. The leaves below it have at
-/// least the piece's triangles, cuts adding to them.
+/// No coarse node without a reason has more triangles than its tree's law allows.
 fn check_budgets(
     what: &str,
     built: &Built,
     out: &Path,
     options: &BuildOptions,
-    source_triangles: usize,
     excused: &mut BTreeMap<String, usize>,
 ) {
     let report = report(out);
@@ -260,15 +258,12 @@ fn check_budgets(
                 .iter()
                 .map(|&leaf| u64::from(built.scene.nodes[leaf].triangles))
                 .sum();
-            // No block has more triangles than all of the source, nor a smaller factor than one.
+            // A node that is not at the last step but one has about the triangles that are desired;
+            // one that is has at most twice what rounding the number of steps gives.
             let hierarchy = &options.hierarchy;
-            let whole = source_triangles as f64 / f64::from(hierarchy.desired_tris);
-            let factor = if built.scene.roots().count() == 1 {
-                whole / f64::from(hierarchy.level_factor).powi(node.level as i32)
-            } else {
-                1.0
-            };
-            let most = (below as f64 / factor.max(1.0)).max(8.0);
+            let desired = f64::from(hierarchy.desired_tris);
+            let budget = 2.0 * f64::from(hierarchy.level_factor).sqrt() * desired;
+            let most = (below as f64).min(budget).max(8.0);
             assert!(
                 f64::from(node.triangles) <= (most * 1.1).ceil() + 1.0,
                 "{what}: {} has {} triangles, at most {most} are in its budget, and no reason",

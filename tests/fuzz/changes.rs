@@ -1,5 +1,7 @@
 //! Seeded changes of files.
 
+use hlod::random::Random;
+
 /// Words that readers of text stumble over, and numbers that readers of counts do.
 const WORDS: [&[u8]; 22] = [
     b"nan",
@@ -37,53 +39,41 @@ const NUMBERS: [[u8; 4]; 8] = [
 ];
 
 /// A fixed sequence of changes.
-pub struct Changes(u64);
+pub struct Changes(Random);
 
 impl Changes {
     pub fn new(seed: u64) -> Self {
-        Self(seed ^ 0x5eed)
-    }
-
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, count: usize) -> usize {
-        (self.bits() % count.max(1) as u64) as usize
+        Self(Random::new(seed, 0))
     }
 
     /// A changed copy; `others` are what parts may come from.
     pub fn apply(mut self, whole: &[u8], others: &[Vec<u8>]) -> Vec<u8> {
         let mut bytes = whole.to_vec();
-        for _ in 0..1 + self.below(4) {
+        for _ in 0..1 + self.0.below(4) {
             if bytes.is_empty() {
                 break;
             }
-            let at = self.below(bytes.len());
-            let length = 1 + self.below(64);
+            let at = self.0.below(bytes.len());
+            let length = 1 + self.0.below(64);
             let end = (at + length).min(bytes.len());
-            match self.below(9) {
-                0 => bytes[at] ^= 1 << self.below(8),
-                1 => bytes[at] = self.bits() as u8,
+            match self.0.below(9) {
+                0 => bytes[at] ^= 1 << self.0.below(8),
+                1 => bytes[at] = self.0.bits() as u8,
                 2 => drop(bytes.drain(at..end)),
                 3 => bytes.truncate(at),
                 4 => {
                     let part = bytes[at..end].to_vec();
-                    let to = self.below(bytes.len());
+                    let to = self.0.below(bytes.len());
                     bytes.splice(to..to, part);
                 }
                 5 => {
-                    let other = &others[self.below(others.len())];
-                    let from = self.below(other.len());
+                    let other = &others[self.0.below(others.len())];
+                    let from = self.0.below(other.len().max(1));
                     let part = &other[from..(from + length).min(other.len())];
                     bytes.splice(at..end, part.iter().copied());
                 }
                 6 => {
-                    let number = NUMBERS[self.below(NUMBERS.len())];
+                    let number = NUMBERS[self.0.below(NUMBERS.len())];
                     let aligned = at / 4 * 4;
                     let room = (bytes.len() - aligned).min(4);
                     bytes[aligned..aligned + room].copy_from_slice(&number[..room]);
@@ -99,7 +89,7 @@ impl Changes {
         let is_end = |byte: &u8| b" \n,:[]{}/\"".contains(byte);
         let start = bytes[..at].iter().rposition(is_end).map_or(0, |before| before + 1);
         let end = bytes[start..].iter().position(is_end).map_or(bytes.len(), |end| start + end);
-        let word = WORDS[self.below(WORDS.len())];
+        let word = WORDS[self.0.below(WORDS.len())];
         bytes.splice(start..end, word.iter().copied());
     }
 }

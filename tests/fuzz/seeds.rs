@@ -3,8 +3,8 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use hlod::build::progress::Silent;
-use hlod::build::{BuildOptions, build};
+use hlod::builder::progress::Silent;
+use hlod::builder::{BuildOptions, build};
 use hlod::city::{self, CityOptions, TextureSize};
 use hlod::format::{NODES_DIR, SCENE_FILE};
 use image::{DynamicImage, GrayImage, ImageFormat, RgbImage, RgbaImage};

@@ -1,9 +1,9 @@
 //! Blocks of odd sizes and shapes, and trees of odd depths.
 
 use glam::DVec3;
-use hlod::build::BuildOptions;
-use hlod::build::blocks::BlockMode;
-use hlod::build::hierarchy::HierarchyOptions;
+use hlod::builder::BuildOptions;
+use hlod::builder::blocks::plan::BlockMode;
+use hlod::builder::hierarchy::{HierarchyOptions, TreeShape};
 
 use crate::chain::{Chain, options};
 use crate::figures::Figures;
@@ -70,7 +70,9 @@ fn blocks_of_any_size_and_shape() {
             let at = |x: f64, y: f64| DVec3::new(x, y + n as f64, hill(x, y + n as f64));
             shape.triangle([at(25.0, 0.0), at(26.0, 0.0), at(25.0, 1.0)]);
         }
-        chain(&shape, &default)
+        // A balanced tree would make a leaf of twice as many.
+        let hierarchy = HierarchyOptions { tree: TreeShape::Thesis, ..HierarchyOptions::default() };
+        chain(&shape, &BuildOptions { hierarchy, ..default.clone() })
     };
     assert_eq!(square(0).built.scene.nodes.len(), 1, "900 triangles are one node");
     let [one, two] = [square(1), square(2)];
@@ -91,7 +93,7 @@ fn blocks_of_any_size_and_shape() {
         ("frame", f64::INFINITY),
         ("expected", f64::INFINITY),
     ];
-    check("one triangle wide, 1 km long", &long, &apart, "in ten pieces side by side", bounds, why);
+    check("one triangle wide, 1 km long", &long, &apart, "in ten chunks side by side", bounds, why);
     table.finish();
 }
 
@@ -103,7 +105,7 @@ fn trees_of_any_depth() {
     let path = usual.path();
     let of_usual = usual.figures(&path, 1.0);
     let levels =
-        |desired: f64, factor: f64| ((8192.0 / desired).ln() / factor.ln()).ceil() as usize + 1;
+        |desired: f64, factor: f64| ((8192.0 / desired).ln() / factor.ln()).round() as usize + 1;
     // What does not depend on the levels there are.
     let common = |figures: &Figures| {
         let names = ["leaf area", "leaf colour RMS", "widest gap"];

@@ -21,8 +21,9 @@ fn moved(input: &Path, folder: &Path, back: DVec3, shake: u64) -> PathBuf {
         let _ = match fields[..] {
             ["v", x, y, z, ..] => {
                 let at = DVec3::from([x, y, z].map(|c| c.parse().unwrap())) - back;
-                let mut random = Random(
+                let mut random = Random::new(
                     at.to_array().iter().fold(shake, |s, c| s.rotate_left(21) ^ c.to_bits()),
+                    0,
                 );
                 let at = if shake > 0 { at + half_a_step(&mut random) } else { at };
                 writeln!(moved, "v {} {} {}", at.x, at.y, at.z)

@@ -49,7 +49,7 @@ fn mapped(map: impl Fn(usize, [f64; 2]) -> [f64; 2]) -> Shape {
 
 #[test]
 fn pictures_of_every_kind() {
-    let mut table = Table::new("8-pictures", "Pictures and texture coordinates");
+    let mut table = Table::new("8-pictures", "Textures and texture coordinates");
     let mut check = |name: &str, case: Chain, twin: &Twin, bounds: Bounds, why: &str| {
         table.verified(name, case.failures());
         table.within(name, &figures(&case), twin, bounds, why);

@@ -47,7 +47,7 @@ fn place(folder: &Path, placement: &Placement, round: bool, shake: u64) -> PathB
                     // The same for all vertices of one place, or it would tear.
                     let place = p.to_array().map(f64::to_bits);
                     let seed = place.iter().fold(shake, |s, bits| s.rotate_left(21) ^ bits);
-                    p += half_a_step(&mut Random(seed));
+                    p += half_a_step(&mut Random::new(seed, 0));
                 }
                 let p = placement.point(p);
                 writeln!(moved, "v {} {} {}", p.x, p.y, p.z)
@@ -153,14 +153,15 @@ fn what_is_turned_is_as_good() {
         ("RMS", 0.6),
         ("colour RMS", 0.15),
         ("leaf colour", 0.3),
-        ("stored error", 1.5),
+        // Of the largest distance alone, now that a bound says hardly more than that.
+        ("stored error", 2.0),
         ("nodes", 0.4),
         ("triangles drawn", 0.2),
         ("toggles", 0.2),
         ("frame", 0.1),
         ("expected", 0.1),
     ];
-    let why = "other planes cut other pieces, small ones at the corners of the box";
+    let why = "other planes cut other chunks, small ones at the corners of the box";
     table.within("hills, by 37.3°", &chain.figures(&odd.path(&path), 1.0), &twin, bounds, why);
     table.finish();
 }

@@ -70,7 +70,7 @@ impl Shape {
 
     /// Moved by less than what coordinates are rounded by; 0 leaves it alone.
     pub fn shaken(mut self, seed: u64) -> Self {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed, 0);
         if seed > 0 {
             self.positions.iter_mut().for_each(|p| *p += half_a_step(&mut random));
         }
@@ -114,7 +114,7 @@ impl Shape {
 
 /// Less than half a step of the lattice over 64 m along each axis.
 pub fn half_a_step(random: &mut Random) -> DVec3 {
-    DVec3::from([(); 3].map(|()| random.within(-3e-6, 3e-6)))
+    DVec3::from([(); 3].map(|()| random.between(-3e-6, 3e-6)))
 }
 
 /// Bands and spots, the same at any resolution: sRGB at a place of the picture.

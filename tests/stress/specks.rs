@@ -28,10 +28,10 @@ fn hills() -> Shape {
 /// These with more triangles, each made from a place and two directions of length 1.
 fn hills_with(make: impl Fn(DVec3, [DVec3; 2]) -> [DVec3; 3]) -> Shape {
     let mut shape = hills();
-    let mut random = Random(5);
+    let mut random = Random::new(5, 0);
     for _ in 0..ADDED {
-        let (x, y) = (random.within(12.0, 52.0), random.within(12.0, 52.0));
-        let angle = random.within(0.0, std::f64::consts::TAU);
+        let (x, y) = (random.between(12.0, 52.0), random.between(12.0, 52.0));
+        let angle = random.between(0.0, std::f64::consts::TAU);
         let along = DVec3::new(angle.cos(), angle.sin(), 0.0);
         shape.triangle(make(DVec3::new(x, y, GROUND), [along, along.cross(DVec3::Z)]));
     }
@@ -63,21 +63,23 @@ fn specks_change_nothing() {
     let mut check =
         |name: &str, shape: Shape, twin: &Twin, bounds: Bounds, why: &str| match chain(&shape) {
             Ok(chain) => {
-                table.verified(name, chain.failures());
+                // The distance to needles is bounded, but not within the tenth that others are.
+                table.verified(name, chain.failures_but_loose_bounds());
                 table.within(name, &chain.figures(&path, 1.0), twin, bounds, why);
             }
             Err(error) => table.verified(name, vec![error.to_string()]),
         };
     let thin: Bounds = &[
-        ("leaf triangles", 0.04),
-        ("triangles, level", 0.03),
+        // Planes are placed by what they cross, and needles left out are crossed by none.
+        ("leaf triangles", 0.15),
+        ("triangles, level", 0.08),
         ("triangles drawn", 0.12),
         ("nodes", 0.12),
         ("toggles", 0.12),
         ("frame", 0.04),
         ("expected", 0.04),
         // Which side of a cut a speck goes to, as a whole, changes what is simplified beside it.
-        ("stored", 0.75),
+        ("stored", 0.85),
         ("RMS", 0.1),
     ];
     check(
@@ -168,7 +170,8 @@ fn what_spans_no_surface_is_refused_or_built() {
     let path = nearly.path();
     let twin = Twin::one("hills of 0.3 µm", nearly.figures(&path, 1.0));
     let flat = chain(&all_at(&|p| DVec3::new(p.x, p.y, 0.0))).unwrap();
-    table.verified("in one plane", flat.failures());
+    // What comes back exactly is bounded by the rounding of what its triangles are clipped at.
+    table.verified("in one plane", flat.failures_but_loose_bounds());
     table.same("in one plane", &flat.figures(&path, 1.0), &twin);
     table.finish();
 }

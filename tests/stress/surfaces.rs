@@ -195,10 +195,11 @@ fn odd_surfaces_are_as_good_as_sound_ones() {
     let fewer: Bounds = &[
         ("leaf triangles", 0.26),
         ("triangles drawn", 0.3),
-        ("triangles, level", 0.05),
+        // Another number of nodes is leaves, and their triangles count for every level below.
+        ("triangles, level", 0.2),
         ("nodes", 0.3),
-        ("stored", 2.0),
-        ("RMS", 1.5),
+        ("stored", 4.0),
+        ("RMS", 1.75),
     ];
     let why = "a quarter fewer triangles; rows do not hold together";
     check("T-junctions", &junctions(false), &twins("joined", &junctions(true)), fewer, why);

@@ -10,7 +10,7 @@ pub struct Limits {
     /// Toggles, up and down together (a number: 3)
     #[arg(long, value_name = "N|%")]
     pub max_toggle_increase: Option<Limit<Count>>,
-    /// The most frames in a row that each toggled (a number: 3)
+    /// Longest run of frames that all toggled (a number: 3)
     #[arg(long, value_name = "N|%")]
     pub max_toggle_run_increase: Option<Limit<Count>>,
     /// Mean frame time (with its unit: 0.5ms)
@@ -28,22 +28,22 @@ pub struct Limits {
     /// Share of frames over the target by more than a tenth (percentage points: 2pp)
     #[arg(long, value_name = "PP|%")]
     pub max_late_increase: Option<Limit<Points>>,
-    /// How far estimates are off on average, in either direction (percentage points: 0.5pp)
+    /// Mean error of estimated frame times, in either direction (percentage points: 0.5pp)
     #[arg(long, value_name = "PP|%")]
     pub max_estimate_error_increase: Option<Limit<Points>>,
-    /// Standard deviation of how far estimates are off (percentage points: 0.5pp)
+    /// Standard deviation of that error (percentage points: 0.5pp)
     #[arg(long, value_name = "PP|%")]
     pub max_estimate_deviation_increase: Option<Limit<Points>>,
-    /// The most bytes that were in use (with their unit: 10MiB)
+    /// Peak memory (with its unit: 10MiB)
     #[arg(long, value_name = "BYTES|%")]
     pub max_memory_increase: Option<Limit<Bytes>>,
     /// Bytes read from files (with their unit: 10MiB)
     #[arg(long, value_name = "BYTES|%")]
     pub max_read_increase: Option<Limit<Bytes>>,
-    /// Nodes that made room for others (a number: 3)
+    /// Evicted nodes (a number: 3)
     #[arg(long, value_name = "N|%")]
     pub max_eviction_increase: Option<Limit<Count>>,
-    /// Mean time to choose what is drawn (with its unit: 20us)
+    /// Mean time of selection (with its unit: 20us)
     #[arg(long, value_name = "MS|%")]
     pub max_select_increase: Option<Limit<Milliseconds>>,
     /// Nodes that selection visits in a frame, on average (a number: 3)

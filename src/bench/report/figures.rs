@@ -1,10 +1,8 @@
-//! The plots of a report, in the order of the thesis's chapter 6.
+//! A plot with its words, and what plots share.
 
 use super::plot::{Axis, Layer, Plot, Shape};
 use super::series::Places;
-use super::{accuracy, detail, estimate, frame_time, memory, toggles};
 use crate::Result;
-use crate::bench::{Context, Run};
 
 /// A plot with its words.
 pub(super) struct Figure {
@@ -14,30 +12,6 @@ pub(super) struct Figure {
     /// A sentence on what it shows, and what to know about it.
     pub caption: String,
     pub plot: Plot,
-}
-
-/// Plots that belong together.
-pub(super) struct Section {
-    pub title: &'static str,
-    pub figures: Vec<Figure>,
-}
-
-/// All plots.
-pub(super) fn sections(run: &Run, context: &Context) -> Vec<Section> {
-    let frames = &run.frames;
-    let section = |title, figures| Section { title, figures };
-    let mut sections = vec![
-        section("Memory and loading", memory::figures(run, context)),
-        section("Level of detail", detail::figures(frames, context.levels)),
-        section("Accuracy of estimated time", estimate::figures(frames)),
-        section("Frame time", frame_time::figures(frames, context)),
-        section("Toggles", toggles::figures(frames)),
-    ];
-    let accuracy = accuracy::figures(frames);
-    if !accuracy.is_empty() {
-        sections.push(section("Accuracy", accuracy));
-    }
-    sections
 }
 
 impl Figure {

@@ -8,6 +8,7 @@ mod figures;
 mod frame_time;
 mod memory;
 mod plot;
+mod sections;
 mod series;
 mod sweep;
 mod table;
@@ -21,7 +22,8 @@ use serde_json::Value;
 
 use super::{Context, Run};
 use crate::Result;
-use figures::{Figure, Section, sections};
+use figures::Figure;
+use sections::{Section, sections};
 pub use sweep::sweep_html;
 
 const STYLE: &str = include_str!("style.css");

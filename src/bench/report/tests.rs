@@ -6,14 +6,12 @@ use super::*;
 use crate::bench::{
     Accuracy, BenchOptions, ClockConstants, FrameRecord, ReferenceContext, WorstFrame, summary,
 };
+use crate::random::Random;
 
 /// A run of made-up frames that has a little of everything.
 fn frames(count: usize, levels: usize) -> Run {
-    let mut random = 1u64;
-    let mut noise = move || {
-        random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (random >> 33) as f64 / (1u64 << 31) as f64
-    };
+    let mut random = Random::new(1, 0);
+    let mut noise = move || random.unit();
     let frame = |index: usize| {
         let nodes_by_level: Vec<u32> = (0..levels).map(|_| (noise() * 90.0) as u32).collect();
         let triangles_by_level: Vec<u64> =

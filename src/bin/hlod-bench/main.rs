@@ -16,11 +16,11 @@ use hlod::{Error, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use run_args::{Clock, RunArgs, parse_size};
 
-/// Replays a camera path over a built scene and logs what a user would have felt.
+/// Replays a camera path over a built scene and measures frame times, toggles, memory and image error.
 ///
-/// Chooses levels of detail for every frame as Lakhia's thesis (2004) describes, loads nodes
-/// beside drawing below a memory cap, draws offscreen, and writes frames.csv, summary.json and
-/// report.html into the folder --out.
+/// Selects levels of detail for every frame as in Lakhia's thesis (2004), loads nodes in another
+/// thread within a memory cap, draws offscreen, and writes frames.csv, summary.json and report.html
+/// into the folder --out.
 #[derive(Parser, Debug)]
 #[command(
     version,
@@ -42,10 +42,11 @@ enum Command {
     /// Writes a camera path for a built scene
     MakePath {
         /// The output folder of hlod-build
+        #[arg(value_name = "OUT")]
         scene: PathBuf,
         /// walk and drive: along the streets at 1.5 and 15 m/s; fly: from a street up and over
-        /// the city; orbit: a circle and two passes through the middle; still: standing;
-        /// shake: swaying a little
+        /// the city; orbit: a circle and two passes through the middle; still: no motion;
+        /// shake: small swaying motion
         #[arg(long, value_enum)]
         kind: PathKind,
         /// Frames, 1 or more [default: what suits the kind]
@@ -54,7 +55,7 @@ enum Command {
         /// Frames a second
         #[arg(long, value_name = "FPS", default_value_t = DEFAULT_FPS)]
         fps: f64,
-        /// Another seed gives another route
+        /// Seed of the random route
         #[arg(long, value_name = "SEED", default_value_t = 0)]
         seed: u64,
         /// The file to write
@@ -67,7 +68,7 @@ enum Command {
         base: PathBuf,
         /// summary.json of the run in question
         new: PathBuf,
-        /// Compare runs over different scenes, paths or parameters all the same
+        /// Compare even where scenes, paths or parameters differ
         #[arg(long)]
         force: bool,
         /// One JSON object instead of a table
@@ -76,10 +77,10 @@ enum Command {
         #[command(flatten)]
         limits: Box<Limits>,
     },
-    /// Replays a path at several targets: image error against frame time, in sweep.csv and
-    /// sweep.html, beside a folder for each run
+    /// Replays a path at several frame-time targets and writes image error against frame time, as
+    /// sweep.csv and sweep.html, and a folder for each run
     Sweep {
-        /// Milliseconds that a frame may take, above 0, one run each
+        /// Frame-time targets in milliseconds, above 0; one run each
         #[arg(long, value_name = "MS,MS", value_delimiter = ',', default_value = "5,10,20,30,60")]
         targets: Vec<f64>,
         /// As for one run; --reference-every is 10 unless given
@@ -89,11 +90,12 @@ enum Command {
     /// Measures the constants of the model clock on this machine
     Calibrate {
         /// The output folder of hlod-build
+        #[arg(value_name = "OUT")]
         scene: PathBuf,
         /// Which graphics adapter: part of its name, or its number
         #[arg(long, value_name = "NAME")]
         adapter: Option<String>,
-        /// Width and height of the picture in pixels
+        /// Width and height of the image in pixels, 1-16384 each
         #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
         size: Size,
         /// The file to write, for --constants
@@ -313,7 +315,7 @@ fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Res
     let constants = session.calibrate(&path, &mut renderer)?;
     constants.write(out)?;
     print(&format!(
-        "an empty frame    {:.2} ms\na unit of cost    {:.6} ms\nthe whole picture {:.0} units of cost\na node            {:.4} ms\n\
+        "an empty frame    {:.2} ms\na unit of cost    {:.6} ms\nthe whole image   {:.0} units of cost\na node            {:.4} ms\n\
          loading           {:.1} MB/s\nc_textured        {:.3}\nwritten: {}\n",
         constants.fixed_ms,
         constants.ms_per_cost,

@@ -14,25 +14,25 @@ const TARGET_MS: f64 = 30.0;
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
     /// The output folder of hlod-build
-    #[arg(required = true)]
+    #[arg(required = true, value_name = "OUT")]
     pub scene: Option<PathBuf>,
-    /// The path: frame,time_s,x,y,z,qx,qy,qz,qw,fov_y_deg
+    /// The camera path, a row for each frame: frame,time_s,x,y,z,qx,qy,qz,qw,fov_y_deg
     #[arg(required = true, value_name = "PATH.csv")]
     pub path: Option<PathBuf>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "bench")]
     pub out: PathBuf,
-    /// `wall` draws and measures; `model` takes times from a model, needs no graphics adapter and
-    /// gives the same on every machine
+    /// `wall` draws and measures; `model` takes times from a cost model, needs no graphics adapter
+    /// and gives the same log on every machine
     #[arg(long, value_enum, default_value_t = Clock::Wall)]
     pub clock: Clock,
     /// Constants that `calibrate` wrote [default: wall: measured at the start; model: built in]
     #[arg(long, value_name = "CLOCK.json")]
     pub constants: Option<PathBuf>,
-    /// `recorded`: a frame begins no sooner than the path has it; `unthrottled`: at once
+    /// When the next frame begins: `recorded`, not before its time in the path; `unthrottled`, at once
     #[arg(long, value_enum, default_value_t = Pace::Recorded)]
     pub pace: Pace,
-    /// Frames for which the camera stands at the first pose before the log begins
+    /// Warm-up frames at the first pose, before the log begins
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub settle_frames: u64,
     /// Print nothing but errors
@@ -42,80 +42,87 @@ pub struct RunArgs {
     /// c_targetTime: milliseconds that a frame may take, above 0 [default: 30]
     #[arg(long, value_name = "MS", help_heading = "Selection")]
     pub target_ms: Option<f64>,
-    /// c_vis: what being in view adds to a node's benefit, 0 or more
+    /// c_vis: weight of visibility in a node's benefit, 0 or more
     #[arg(long, value_name = "C", default_value_t = 1.275, help_heading = "Selection")]
     pub vis: f64,
-    /// c_fore: how much the angle counts at which a node is seen, 0-1
+    /// c_fore: weight of foreshortening in a node's benefit, 0-1
     #[arg(long, value_name = "C", default_value_t = 0.45, help_heading = "Selection")]
     pub fore: f64,
-    /// c_hystSwitch: how far a counter goes before it counts. More: fewer and later switches
+    /// c_hystSwitch: value at which a hysteresis counter takes effect, above 0. More: fewer and
+    /// later toggles
     #[arg(long, value_name = "C", default_value_t = 1500.0, help_heading = "Selection")]
     pub hyst_switch: f64,
-    /// c_hystLimit: how far counters go at most, --hyst-switch or more
+    /// c_hystLimit: largest magnitude of a hysteresis counter, --hyst-switch or more
     #[arg(long, value_name = "C", default_value_t = 4510.0, help_heading = "Selection")]
     pub hyst_limit: f64,
-    /// Where counters begin: `affordable` lets nodes in at once only where their time suffices
+    /// Where hysteresis counters start: `affordable` draws nodes at once only where their time
+    /// slice suffices
     #[arg(long, value_enum, default_value_t = StartOfHysteresis::Affordable, help_heading = "Selection")]
     pub hyst_start: StartOfHysteresis,
-    /// Seconds by which the camera is moved on before distances are taken
+    /// Seconds by which the camera is extrapolated before distances are measured, 0 or more
     #[arg(long, value_name = "S", default_value_t = 0.5, help_heading = "Selection")]
     pub lookahead: f64,
-    /// Metres; what is nearer counts as this near [default: 1, less in scenes below 100 m]
+    /// Least distance of a node in metres, above 0; nearer ones count as this far [default: 1, less
+    /// in scenes below 100 m]
     #[arg(long, value_name = "M", help_heading = "Selection")]
     pub least_distance: Option<f64>,
-    /// Draw children only where all of them are in memory, not only those in view
+    /// Draw children only where all of them are in memory, rather than all that are in view
     #[arg(long, help_heading = "Selection")]
     pub all_siblings: bool,
-    /// By what part v_time follows the last frame, 0-1; 0 turns this feedback off
+    /// Gain of the feedback on v_time, the time of a unit of cost, 0-1; 0 turns it off
     #[arg(long, value_name = "PART", default_value_t = 0.1, help_heading = "Selection")]
     pub v_time_gain: f64,
-    /// By what part shareTime changes in a frame, 0-1; 0 turns this feedback off
+    /// Gain of the feedback on shareTime, the time that is divided among the nodes, 0-1; 0 turns
+    /// it off
     #[arg(long, value_name = "PART", default_value_t = 0.01, help_heading = "Selection")]
     pub share_gain: f64,
-    /// The part of the target by which frames must miss it before shareTime changes
+    /// Fraction of the target by which frames must miss it before shareTime changes, 0 or more
     #[arg(long, value_name = "PART", default_value_t = 0.05, help_heading = "Selection")]
     pub share_slack: f64,
-    /// How many times the time for nodes shareTime may be, 1 or more. More: finer where little is
-    /// in view, and later back on target when more comes
+    /// Largest shareTime, as a multiple of the time that the target leaves for nodes, 1 or more.
+    /// More: finer where little is in view, but later back on target when more comes into view
     #[arg(long, value_name = "TIMES", default_value_t = 10.0, help_heading = "Selection")]
     pub share_limit: f64,
-    /// `plain` as the thesis words it, which swings; `damped` waits for what is on its way
+    /// Feedback on shareTime: `plain`, the thesis's, which oscillates; `damped` waits for pending
+    /// changes
     #[arg(long, value_enum, default_value_t = ShareFeedback::Damped, help_heading = "Selection")]
     pub share_feedback: ShareFeedback,
 
-    /// maxMemory: the most bytes in use, loads under way included; with KiB, MiB or GiB
+    /// maxMemory: memory cap in bytes, loads in progress included; with KiB, MiB or GiB
     #[arg(long, value_name = "BYTES", default_value = "1GiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
     pub max_memory: u64,
-    /// Bytes read before looking again at what matters most
+    /// Chunk of a file that is read before the most important node is determined again, in bytes
     #[arg(long, value_name = "BYTES", default_value = "64KiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
     pub portion: u64,
-    /// Bytes that become resident in a frame; one node always does
+    /// Upload limit of a frame in bytes; one node is always uploaded
     #[arg(long, value_name = "BYTES", default_value = "4MiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
     pub upload: u64,
-    /// A node makes room only for one whose priority is higher by this part
+    /// Fraction by which a node's priority must be higher than that of the nodes that are evicted
+    /// for it, 0 or more
     #[arg(long, value_name = "PART", default_value_t = 0.1, help_heading = "Memory and loading")]
     pub evict_margin: f64,
 
-    /// Width and height of the picture in pixels
+    /// Width and height of the image, 1-16384 each, in pixels
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size, help_heading = "Drawing")]
     pub size: Size,
-    /// Which graphics adapter: part of its name, or its number
+    /// Graphics adapter: part of its name, or its number [default: the first, graphics cards before
+    /// software]
     #[arg(long, value_name = "NAME", help_heading = "Drawing")]
     pub adapter: Option<String>,
     /// Write every Nth frame as PNG into DIR/snapshots, N 1 or more
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Drawing")]
     pub snapshots: Option<u64>,
-    /// Draw every Nth frame from the leaves too, outside of its time, and log how far it is from
-    /// that: FLIP, PSNR, SSIM, gaps, and the pop where levels toggled. N 1 or more
+    /// Draw every Nth frame from the leaves as well, excluded from its time, and log the image error:
+    /// FLIP, PSNR, SSIM, gaps, and the pop where levels toggled. N 1 or more
     #[arg(long, value_name = "N", conflicts_with = "show_levels", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Drawing")]
     pub reference_every: Option<u64>,
     /// Tint nodes by level
     #[arg(long, help_heading = "Drawing")]
     pub show_levels: bool,
-    /// `photo`: pictures as they are; `head-light`: lit from behind the viewer; `unlit`
+    /// `photo`: textures unlit, the rest lit; `head-light`: lit from behind the viewer; `unlit`
     #[arg(long, value_enum, default_value_t = ShadingArg::Photo, help_heading = "Drawing")]
     pub shading: ShadingArg,
-    /// Leave away the backs of triangles that are not double-sided
+    /// Cull back faces of materials that are not double-sided
     #[arg(long, help_heading = "Drawing")]
     pub cull: bool,
 }

@@ -1,5 +1,6 @@
 //! What each kind of path promises, on maps drawn by hand.
 
+use clap::ValueEnum;
 use glam::{DVec2, DVec3};
 
 use super::plan::Plan;
@@ -7,15 +8,6 @@ use super::raster::Surfaces;
 use super::*;
 use crate::camera::{Frustum, up_vector};
 use crate::mesh::UpAxis;
-
-const KINDS: [PathKind; 6] = [
-    PathKind::Walk,
-    PathKind::Drive,
-    PathKind::Fly,
-    PathKind::Orbit,
-    PathKind::Still,
-    PathKind::Shake,
-];
 
 /// A town of 5 × 4 houses of 30 m with streets of 10 m between them, on a slope or with no ground
 /// at all, `size` times as large.
@@ -285,7 +277,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_another_route() {
         text
     };
     let (one, same) = (town(UpAxis::Z, 1.0, true), town(UpAxis::Z, 1.0, true));
-    for kind in KINDS {
+    for kind in PathKind::value_variants().iter().copied() {
         assert_eq!(text(&one, kind, 300, 9), text(&same, kind, 300, 9), "{kind:?}");
     }
     for kind in [PathKind::Walk, PathKind::Drive, PathKind::Fly, PathKind::Still] {
@@ -299,7 +291,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_another_route() {
 #[test]
 fn numbers_out_of_range_are_refused_and_single_frames_made() {
     let ground = town(UpAxis::Y, 1.0, true);
-    for kind in KINDS {
+    for kind in PathKind::value_variants().iter().copied() {
         for (frames, fps) in
             [(0, 30.0), (usize::MAX, 30.0), (9, 0.0), (9, -1.0), (9, f64::NAN), (9, f64::INFINITY)]
         {

@@ -61,7 +61,7 @@ fn square() -> (Value, Vec<u8>) {
     (json, binary)
 }
 
-/// The square's material with an embedded picture (of which only the bytes matter here).
+/// The square's material with an embedded texture (of which only the bytes matter here).
 fn textured() -> (Value, Vec<u8>) {
     let (mut json, mut binary) = square();
     binary.extend(b"PNG!");
@@ -87,14 +87,14 @@ fn a_square_is_read_whole() {
     let part = &model.parts[0];
     assert_eq!(part.indices, [0, 1, 2, 0, 2, 3]);
     assert_eq!(part.positions[2], [1.0, 1.0, 0.0]);
-    assert!(part.texcoords.is_empty(), "no picture, no texture coordinates");
+    assert!(part.texcoords.is_empty(), "no texture, no texture coordinates");
     assert_eq!(model.materials[0].base_color, [0.5, 0.25, 1.0, 1.0]);
     assert!(!model.materials[0].double_sided);
     assert!(model.warnings.is_empty());
 }
 
 #[test]
-fn pictures_wrap_alpha_and_transform_are_kept() {
+fn textures_wrap_alpha_and_transform_are_kept() {
     let (mut json, binary) = textured();
     json["materials"][0]["alphaMode"] = "MASK".into();
     json["materials"][0]["alphaCutoff"] = 0.25.into();
@@ -131,7 +131,7 @@ fn the_texture_coordinate_set_can_be_another() {
 }
 
 #[test]
-fn specular_glossiness_gives_colour_and_picture() {
+fn specular_glossiness_gives_colour_and_texture() {
     let (mut json, binary) = textured();
     json["materials"][0] = json!({"extensions": {"KHR_materials_pbrSpecularGlossiness": {
         "diffuseFactor": [0.1, 0.2, 0.3, 1], "diffuseTexture": {"index": 0}}}});

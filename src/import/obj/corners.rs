@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use rustc_hash::FxHashMap;
 
-use super::super::clean::Tally;
+use super::super::clean::CleanStats;
 use super::super::vertices::{NONE, Pair, Unifier};
 use super::statements::Statements;
 use crate::mesh::Triangulator;
@@ -27,7 +27,7 @@ pub(super) struct Triangles {
     pub(super) indices: Vec<u32>,
     /// Part of each run, where its indices end, and its faces without texture coordinates.
     pub(super) runs: Vec<(u32, usize, u64)>,
-    pub(super) tally: Tally,
+    pub(super) stats: CleanStats,
 }
 
 impl Triangles {
@@ -80,11 +80,11 @@ impl Triangles {
                 outline.clear();
                 outline.extend(face.iter().map(|[position, _]| positions[*position as usize]));
                 if !outline.as_flattened().iter().all(|coordinate| coordinate.is_finite()) {
-                    result.tally.not_finite += face.len() as u64 - 2;
+                    result.stats.not_finite += face.len() as u64 - 2;
                     continue;
                 }
                 let triangles = triangulator.triangulate(&outline);
-                result.tally.flat_polygons += u64::from(triangles.is_empty());
+                result.stats.flat_polygons += u64::from(triangles.is_empty());
                 triangles.as_flattened().iter().for_each(|corner| add(*corner as usize));
             }
             result.runs.push((run.part, result.indices.len(), bare_faces));

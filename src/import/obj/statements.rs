@@ -3,10 +3,10 @@
 //! An index that counts back may reach before the chunk, so it is kept relative to the chunk's
 //! beginning, and how many elements the chunk needs before it is all that is checked later.
 
-use super::super::clean::Tally;
-use super::super::color::{srgb_to_linear, to_unorm16};
+use super::super::clean::CleanStats;
 use super::super::lines::{Lines, text};
 use super::super::tokens::{Corner, corner, corner_at, number, plain_decimal_at, word};
+use crate::color::{srgb_to_linear, unorm16};
 
 /// Most corners of a face: beyond this the ear clipping's own indices could overflow.
 const MOST_CORNERS: usize = 1 << 20;
@@ -57,7 +57,7 @@ pub(super) struct Statements {
     pub(super) changes: Vec<(usize, Change)>,
     /// How many positions and texture coordinates there must be before the chunk.
     pub(super) needed: [i64; 2],
-    pub(super) tally: Tally,
+    pub(super) stats: CleanStats,
     pub(super) lines: u64,
     /// What cannot be read, and its line from 1; nothing behind it was read.
     pub(super) problem: Option<(u64, String)>,
@@ -142,7 +142,7 @@ impl Statements {
             Some(b"usemtl") => Change::Material(name(rest)),
             Some(b"mtllib") => Change::Libraries(name(rest)),
             Some(b"p" | b"l" | b"curv" | b"curv2" | b"surf") => {
-                self.tally.not_triangles += 1;
+                self.stats.not_triangles += 1;
                 return Ok(());
             }
             // Comments, normals, smoothing groups, display attributes.
@@ -171,9 +171,9 @@ impl Statements {
         if count >= 6 {
             let given = [values[3], values[4], values[5]];
             if given.iter().any(|part| !(0.0..=1.0).contains(part)) {
-                self.tally.colors_clamped += 1;
+                self.stats.colors_clamped += 1;
             }
-            let [r, g, b] = given.map(|part| to_unorm16(srgb_to_linear(part)));
+            let [r, g, b] = given.map(|part| unorm16(srgb_to_linear(part)));
             self.colors.resize(self.positions.len(), WHITE);
             self.colors.push([r, g, b, u16::MAX]);
         } else if !self.colors.is_empty() {
@@ -198,7 +198,7 @@ impl Statements {
         if (u as f32).is_finite() && (v as f32).is_finite() {
             self.texcoords.push([u, v]);
         } else {
-            self.tally.texcoords_not_finite += 1;
+            self.stats.texcoords_not_finite += 1;
             self.texcoords.push([0.0, 1.0]);
         }
         Ok(())
@@ -215,7 +215,7 @@ impl Statements {
             return Err(format!("face of {count} corners; expected at most {MOST_CORNERS}"));
         }
         if count < 3 {
-            self.tally.not_triangles += 1;
+            self.stats.not_triangles += 1;
             self.corners.truncate(first);
         } else {
             self.faces.push(count as u32);

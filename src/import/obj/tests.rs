@@ -1,10 +1,11 @@
 use std::fs;
 
-use super::super::color::{srgb_to_linear, to_unorm16};
 use super::super::lines::text;
 use super::super::tests::check;
 use super::*;
+use crate::color::{srgb_to_linear, unorm16};
 use crate::mesh::{AlphaMode, Wrap};
+use crate::random::Random;
 
 /// Reads `obj` as `city.obj` from a folder that also holds `files`.
 fn read(obj: impl AsRef<[u8]>, files: &[(&str, &str)]) -> Result<Model> {
@@ -26,7 +27,7 @@ fn read_from(folder: &tempfile::TempDir, obj: impl AsRef<[u8]>) -> Result<Model>
 }
 
 fn read_in_chunks(folder: &tempfile::TempDir, obj: &[u8], chunk_bytes: usize) -> Result<Model> {
-    super::read(&folder.path().join("city.obj"), obj, chunk_bytes, &Spent::default())
+    super::read(&folder.path().join("city.obj"), obj, chunk_bytes, &CpuTime::default())
 }
 
 /// The model or the error must be the same wherever the text is divided.
@@ -145,7 +146,7 @@ fn what_has_no_area_at_all_is_refused() {
 }
 
 #[test]
-fn texture_coordinates_far_out_keep_their_digits_where_the_picture_repeats() {
+fn texture_coordinates_far_out_keep_their_digits_where_the_texture_repeats() {
     let read = |clamp: &str, at: f64| {
         let vt = |u: f64, v: f64| format!("vt {} {}\n", at + u, v - at);
         let obj = format!(
@@ -183,7 +184,7 @@ fn a_position_with_two_texture_coordinates_is_two_vertices_only_where_textured()
     assert_eq!(read(obj("t"), &files).unwrap().parts[0].positions.len(), 5);
     let plain = read(obj("c"), &files).unwrap();
     assert_eq!(plain.parts[0].positions.len(), 4);
-    assert!(plain.textures.is_empty(), "a material that no face uses names no picture");
+    assert!(plain.textures.is_empty(), "a material that no face uses names no texture");
 }
 
 #[test]
@@ -223,7 +224,7 @@ fn vertex_colours_are_linear_and_white_ones_are_dropped() {
     let model = read("v 0 0 0\nv 1 0 0 0.5 0 2\nv 0 1 0 1 1 1\nf 1 2 3\n", &[]).unwrap();
     let colors = &model.parts[0].colors;
     assert_eq!(colors[0], [65535; 4]);
-    assert_eq!(colors[1], [to_unorm16(srgb_to_linear(0.5)), 0, 65535, 65535]);
+    assert_eq!(colors[1], [unorm16(srgb_to_linear(0.5)), 0, 65535, 65535]);
     assert_eq!(warnings(&model), [("vertex colour outside 0 to 1, clamped".to_owned(), 1)]);
     let white = "v 0 0 0 1 1 1\nv 1 0 0 1.0 1.0 1.0\nv 0 1 0 1 1 1\nf 1 2 3\n";
     assert!(read(white, &[]).unwrap().parts[0].colors.is_empty());
@@ -302,23 +303,13 @@ fn several_libraries_in_one_statement() {
 }
 
 /// Numbers from a seed.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % limit
-    }
-}
-
 /// The corners of all triangles by group and material name, as places and texture coordinates.
 type Soup = BTreeMap<(String, String), Vec<([f64; 3], [f32; 2])>>;
 
 #[test]
 fn random_files_are_read_as_tobj_reads_them() {
     for seed in 0..200 {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed, 0);
         let mut obj = String::from("mtllib a.mtl\n");
         let (vertices, texcoords) = (3 + random.below(30), 1 + random.below(20));
         for vertex in 0..vertices {
@@ -382,8 +373,8 @@ fn random_files_are_read_as_tobj_reads_them() {
             let material = materials[mesh.material_id.unwrap()].name.clone();
             let corners = mesh.indices.iter().zip(&mesh.texcoord_indices).map(|(at, uv)| {
                 let [at, uv] = [*at as usize * 3, *uv as usize * 2];
-                let place = [mesh.positions[at], mesh.positions[at + 1], mesh.positions[at + 2]];
-                (place, [mesh.texcoords[uv] as f32, (1.0 - mesh.texcoords[uv + 1]) as f32])
+                let position = [mesh.positions[at], mesh.positions[at + 1], mesh.positions[at + 2]];
+                (position, [mesh.texcoords[uv] as f32, (1.0 - mesh.texcoords[uv + 1]) as f32])
             });
             theirs.entry((name.clone(), material)).or_default().extend(corners);
         }
@@ -430,7 +421,7 @@ fn mutated_files_give_a_model_or_an_error() {
         b"\xff",
         b"o\n",
     ];
-    let mut random = Random(1);
+    let mut random = Random::new(1, 0);
     for _ in 0..3000 {
         let mut mutated = bytes.to_vec();
         for _ in 0..1 + random.below(4) {
@@ -486,7 +477,7 @@ fn where_chunks_end_makes_no_difference() {
         b"\n",
     ];
     let folder = folder_with(&[("a.mtl", "newmtl a\nmap_Kd a.mtl\nnewmtl b\nKd 1 0 0\n")]);
-    let mut random = Random(3);
+    let mut random = Random::new(3, 0);
     let mut good = 0;
     for round in 0..1500 {
         let mut obj = format!("{SQUARE}vt 0 1\n").repeat(round % 3).into_bytes();
@@ -523,7 +514,7 @@ fn mutated_libraries_give_a_model() {
     let mtl = "newmtl a\nKd 0.5 0.5 0.5\nd 0.5\nTr 0.2\nmap_Kd -s 2 2 1 -o 0 1 -clamp on a.mtl\n\
         map_d a.mtl\nnewmtl b\nKd 1 1\nillum 2\n";
     let folder = folder_with(&[]);
-    let mut random = Random(2);
+    let mut random = Random::new(2, 0);
     for _ in 0..1500 {
         let mut mutated = mtl.as_bytes().to_vec();
         for _ in 0..1 + random.below(3) {

@@ -2,7 +2,7 @@
 //! above, in linear light, weighted by alpha, so that what is cut away lends no colour.
 
 use super::held::{level_bytes, level_sizes};
-use crate::texture::srgb;
+use crate::color;
 
 /// Linear RGB and alpha, 65535 is 1; not premultiplied.
 type Texel = [u16; 4];
@@ -40,7 +40,7 @@ impl Source<'_> {
         match self {
             Self::Linear(texels) => row.copy_from_slice(&texels[range]),
             Self::Bytes(bytes) => {
-                let table = srgb::to_linear();
+                let table = color::byte_to_linear();
                 for (texel, &[r, g, b, a]) in row.iter_mut().zip(&bytes[range]) {
                     let [r, g, b] = [r, g, b].map(|byte| table[usize::from(byte)]);
                     *texel = [r, g, b, u16::from(a) * 257];
@@ -51,7 +51,7 @@ impl Source<'_> {
 }
 
 fn encode(linear: &[Texel], bytes: &mut [[u8; 4]]) {
-    let table = srgb::to_byte();
+    let table = color::linear_to_byte();
     for (bytes, &[r, g, b, a]) in bytes.iter_mut().zip(linear) {
         let alpha = (u32::from(a) + 128) / 257;
         *bytes = [table.of(r), table.of(g), table.of(b), alpha as u8];
@@ -203,7 +203,8 @@ mod tests {
                     [white, white, white, 255]
                 });
                 let mean = 65535.0 / f64::from(size[0] * size[1]);
-                let found = f64::from(srgb::to_linear()[usize::from(levels.last().unwrap()[0][0])]);
+                let found =
+                    f64::from(color::byte_to_linear()[usize::from(levels.last().unwrap()[0][0])]);
                 let step = mean * 0.025;
                 assert!((found - mean).abs() < step, "{size:?} {white}: {found}, not {mean}");
             }

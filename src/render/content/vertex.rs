@@ -1,7 +1,7 @@
 //! A vertex as the graphics card reads it.
 
+use crate::color;
 use crate::format::Primitive;
-use crate::texture::srgb;
 
 /// A vertex as the graphics card reads it, 24 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -35,7 +35,7 @@ pub(super) fn push_vertices(vertices: &mut Vec<Vertex>, primitive: &Primitive) {
 
 /// A linear colour as bytes: sRGB-encoded, alpha linear.
 fn encoded(linear: [f32; 4]) -> [u8; 4] {
-    let table = srgb::to_byte();
+    let table = color::linear_to_byte();
     let [r, g, b] = [linear[0], linear[1], linear[2]]
         .map(|channel| table.of((channel.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16));
     [r, g, b, (linear[3].clamp(0.0, 1.0) * 255.0 + 0.5) as u8]

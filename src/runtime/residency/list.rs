@@ -284,6 +284,7 @@ fn some(node: u32) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     /// Every promise of the list against a plain recomputation.
     fn check(list: &PriorityList) {
@@ -307,18 +308,17 @@ mod tests {
     #[test]
     fn any_sequence_of_changes_leaves_it_sorted_and_the_first_unloaded_known() {
         let mut list = PriorityList::new(24);
-        let mut state = 1u64;
-        let mut random = |below: u64| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (state >> 33) % below
-        };
+        let mut random = Random::new(1, 0);
         for _ in 0..20_000 {
-            let node = random(24) as u32;
-            match random(8) {
+            let node = random.below(24) as u32;
+            match random.below(8) {
                 0 => list.remove(node),
-                1 | 2 => list.set_loaded(node, random(2) == 0),
-                3 => list.update(&[(node, random(9) as f64), ((node + 1) % 24, random(9) as f64)]),
-                _ => list.set(node, random(9) as f64),
+                1 | 2 => list.set_loaded(node, random.below(2) == 0),
+                3 => list.update(&[
+                    (node, random.below(9) as f64),
+                    ((node + 1) % 24, random.below(9) as f64),
+                ]),
+                _ => list.set(node, random.below(9) as f64),
             }
             check(&list);
         }

@@ -1,6 +1,7 @@
 //! Loading, eviction and the cap, on small hierarchies, with whoever loads played by the test.
 
 use super::*;
+use crate::random::Random;
 use crate::runtime::SceneTree;
 use crate::runtime::test_tree::{Sketch, sketch, tree};
 
@@ -273,11 +274,8 @@ fn nodes_in_memory_that_nobody_visits_come_up_in_turn() {
 /// Random priorities, portions, failures and frames: every promise at every step.
 #[test]
 fn promises_hold_whatever_happens() {
-    let mut state = 7u64;
-    let mut random = move |below: u64| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        (state >> 33) % below
-    };
+    let mut numbers = Random::new(7, 0);
+    let mut random = move |below: u64| numbers.below(below as usize) as u64;
     for round in 0..60 {
         let mut deep = || {
             let pair = |n: u64| sketch([0.0; 3], 1.0, (0..n).map(|_| leaf()).collect());

@@ -3,7 +3,7 @@
 use crate::mesh::{AlphaMode, Material};
 
 /// Materials whose triangles may share a baked texture, by class: all of one class differ in
-/// nothing but their pictures.
+/// nothing but their images.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BakeClasses {
     /// By material: the first material of its class, or `None` where its texture stays as it is.

@@ -85,17 +85,17 @@ impl FlatChart {
         let mut above = Vec::new();
         let mut kept = 0;
         let mut cells = Vec::new();
-        for place in 0..self.triangles.len() {
-            let triangle = self.corners[place].map(|corner| (corner - low) * scale);
+        for index in 0..self.triangles.len() {
+            let triangle = self.corners[index].map(|corner| (corner - low) * scale);
             cells.clear();
             for_centres(triangle, [width, height], -1e-9, |[x, y]| cells.push(y * width + x));
             if kept > 0 && cells.iter().any(|&cell| taken[cell]) {
-                above.push(self.triangles[place]);
+                above.push(self.triangles[index]);
                 continue;
             }
             cells.iter().for_each(|&cell| taken[cell] = true);
-            self.triangles[kept] = self.triangles[place];
-            self.corners[kept] = self.corners[place];
+            self.triangles[kept] = self.triangles[index];
+            self.corners[kept] = self.corners[index];
             kept += 1;
         }
         self.triangles.truncate(kept);
@@ -107,7 +107,7 @@ impl FlatChart {
 /// Two directions across the chart's normal in which its box is small.
 fn axes(mesh: &Mesh, chart: &PlanarChart) -> [DVec3; 2] {
     let normal = chart.normal.try_normalize().unwrap_or(DVec3::Z);
-    // Upright on walls, as the pictures mostly are; on the ground along the first axis.
+    // Upright on walls, as the images mostly are; on the ground along the first axis.
     let reference = if normal.z.abs() < 0.9 { DVec3::Z } else { DVec3::Y };
     let right = reference.cross(normal).normalize();
     let up = normal.cross(right);
@@ -125,10 +125,10 @@ fn axes(mesh: &Mesh, chart: &PlanarChart) -> [DVec3; 2] {
     let mut best = (box_of(right, up) * WORTH_TURNING, [right, up]);
     for turn in 1..TURNS {
         let (sine, cosine) = libm::sincos(std::f64::consts::FRAC_PI_2 * turn as f64 / TURNS as f64);
-        let turned = [right * cosine + up * sine, up * cosine - right * sine];
-        let size = box_of(turned[0], turned[1]);
+        let transposed = [right * cosine + up * sine, up * cosine - right * sine];
+        let size = box_of(transposed[0], transposed[1]);
         if size < best.0 {
-            best = (size, turned);
+            best = (size, transposed);
         }
     }
     best.1

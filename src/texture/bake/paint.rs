@@ -1,20 +1,20 @@
-//! The picture of a flat chart: how many texels it gets, and what each of them shows.
+//! The image of a flat chart: how many texels it gets, and what each of them shows.
 
 use glam::{DVec2, DVec3};
 
 use super::flat::{FlatChart, for_centres};
-use super::source::{Place, Source};
+use super::source::{Source, SurfacePoint};
+use crate::color;
 use crate::mesh::{Mesh, wide};
 use crate::texture::bits::BitGrid;
 use crate::texture::block::{BlockTextures, Prepared};
 use crate::texture::fill;
-use crate::texture::level::LevelPicture;
+use crate::texture::level::LevelImage;
 use crate::texture::raster::Rasterizer;
-use crate::texture::srgb;
 
-/// A chart's picture.
+/// A chart's image.
 pub(super) struct Painted {
-    pub picture: LevelPicture,
+    pub image: LevelImage,
     /// The corners of the chart's triangles in it.
     pub corners: Vec<[DVec2; 3]>,
 }
@@ -34,7 +34,7 @@ const SLACK: f64 = 0.5;
 /// Times that the scale is fitted to the texels that a node may have.
 const FITS: usize = 4;
 
-/// Texels from an outermost triangle to its picture's side.
+/// Texels from an outermost triangle to its image's side.
 fn margin(cell: usize) -> f64 {
     // Cells are marked half a cell beyond the triangles: a whole number of cells then begins there.
     (cell as f64 * 0.5).max(1.0)
@@ -59,11 +59,11 @@ impl BlockTextures<'_> {
             let [a, b, c] = mesh.corners(mesh.triangles[triangle as usize]);
             let cross = (b - a).cross(c - a);
             let normal = cross.normalize_or_zero();
-            let Some(place) = source.nearest((a + b + c) / 3.0, normal, near, 0.0) else {
+            let Some(nearest) = source.nearest((a + b + c) / 3.0, normal, near, 0.0) else {
                 continue;
             };
-            near = Some(place);
-            texels += source.look(place.triangle).density * cross.length();
+            near = Some(nearest);
+            texels += source.triangle(nearest.triangle).density * cross.length();
             area += cross.length();
         }
         if area > 0.0 { (texels / area).sqrt() / self.steps[level] } else { 0.0 }
@@ -110,12 +110,14 @@ impl BlockTextures<'_> {
         // Bilinear sampling of the next finer level averages just the texel's own width.
         let finer = (level + 1).min(self.steps.len() - 1);
         let mut near = None;
-        let byte = srgb::to_byte();
-        let solid: Vec<Solid> = chart
+        let byte = color::linear_to_byte();
+        let to_surface: Vec<TexelToSurface> = chart
             .triangles
             .iter()
             .zip(&corners)
-            .map(|(&triangle, flat)| Solid::new(mesh, mesh.triangles[triangle as usize], *flat))
+            .map(|(&triangle, flat)| {
+                TexelToSurface::new(mesh, mesh.triangles[triangle as usize], *flat)
+            })
             .collect();
         for y in 0..height {
             for x in 0..width {
@@ -123,37 +125,38 @@ impl BlockTextures<'_> {
                 if owner == FREE {
                     continue;
                 }
-                let solid = &solid[owner as usize];
-                let point = solid.at(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-                let Some(place) = source.nearest(point, solid.normal, near, SLACK / scale) else {
+                let to_surface = &to_surface[owner as usize];
+                let point = to_surface.at(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+                let Some(nearest) = source.nearest(point, to_surface.normal, near, SLACK / scale)
+                else {
                     continue;
                 };
-                near = Some(place);
-                let color = self.color_at(source, place, finer);
+                near = Some(nearest);
+                let color = self.color_at(source, nearest, finer);
                 pixels[(y * width + x) * 3..][..3]
                     .copy_from_slice(&color.map(|light| byte.of((light * 65535.0) as u16)));
                 known.set(x, y);
             }
         }
         fill::fill_all(&mut pixels, 3, &known);
-        Painted { picture: LevelPicture::own(size, 3, self.steps[level], pixels), corners }
+        Painted { image: LevelImage::own(size, 3, self.steps[level], pixels), corners }
     }
 
-    /// What the original shows at a place at the level's resolution, linear light, 0–1.
-    fn color_at(&self, source: &Source, place: Place, level: usize) -> [f32; 3] {
-        let look = source.look(place.triangle);
-        let Some(Prepared::Atlas(atlas)) = self.textures.get(look.texture as usize) else {
+    /// What the original shows at a point, at the level's resolution, linear light, 0–1.
+    fn color_at(&self, source: &Source, point: SurfacePoint, level: usize) -> [f32; 3] {
+        let triangle = source.triangle(point.triangle);
+        let Some(Prepared::Atlas(atlas)) = self.textures.get(triangle.texture as usize) else {
             return [1.0; 3];
         };
-        let picture = &atlas.levels[level];
+        let image = &atlas.levels[level];
         let along = |axis: usize| {
-            (0..3).map(|i| place.weights[i] * f64::from(look.texels[i][axis])).sum::<f64>()
+            (0..3).map(|i| point.weights[i] * f64::from(triangle.texels[i][axis])).sum::<f64>()
         };
-        let mut color = picture.light_at([along(0) / picture.step, along(1) / picture.step]);
-        if let Some(colors) = look.colors {
+        let mut color = image.light_at([along(0) / image.step, along(1) / image.step]);
+        if let Some(colors) = triangle.colors {
             for (channel, light) in color.iter_mut().enumerate() {
                 let own =
-                    (0..3).map(|i| place.weights[i] * f64::from(colors[i][channel])).sum::<f64>();
+                    (0..3).map(|i| point.weights[i] * f64::from(colors[i][channel])).sum::<f64>();
                 *light *= (own / 65535.0) as f32;
             }
         }
@@ -162,7 +165,7 @@ impl BlockTextures<'_> {
 }
 
 impl FlatChart {
-    /// Its triangles in texels, and the size of its picture.
+    /// Its triangles in texels, and the size of its image.
     fn on_texels(&self, scale: f64, cell: usize) -> (Vec<[DVec2; 3]>, [usize; 2]) {
         let margin = margin(cell);
         let corners = self
@@ -227,7 +230,7 @@ fn owners(corners: &[[DVec2; 3]], size: [usize; 2]) -> Vec<u32> {
 }
 
 /// From a chart's texels to its triangle in space.
-struct Solid {
+struct TexelToSurface {
     flat: [DVec2; 3],
     corners: [DVec3; 3],
     /// One over twice the area in texels; 0 where it has none.
@@ -235,7 +238,7 @@ struct Solid {
     normal: DVec3,
 }
 
-impl Solid {
+impl TexelToSurface {
     fn new(mesh: &Mesh, triangle: [u32; 3], flat: [DVec2; 3]) -> Self {
         let corners = triangle.map(|vertex| wide(mesh.positions[vertex as usize]));
         let [a, b, c] = flat;

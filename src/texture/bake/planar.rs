@@ -63,7 +63,7 @@ pub(super) fn planar_charts(mesh: &Mesh, members: &[u32]) -> Vec<PlanarChart> {
         .collect();
     let neighbours = neighbours(mesh, members);
     let mut order: Vec<u32> = (0..members.len() as u32).collect();
-    let area = |place: u32| normals[place as usize].length_squared();
+    let area = |index: u32| normals[index as usize].length_squared();
     order.sort_by(|&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
 
     let mut chart_of = vec![FREE; members.len()];
@@ -80,7 +80,7 @@ pub(super) fn planar_charts(mesh: &Mesh, members: &[u32]) -> Vec<PlanarChart> {
     absorb(&mut charts, &mut chart_of, &normals, &neighbours);
     charts.retain(|chart| !chart.triangles.is_empty());
     for chart in &mut charts {
-        chart.triangles.iter_mut().for_each(|place| *place = members[*place as usize]);
+        chart.triangles.iter_mut().for_each(|index| *index = members[*index as usize]);
         chart.triangles.sort_unstable();
     }
     charts
@@ -89,24 +89,24 @@ pub(super) fn planar_charts(mesh: &Mesh, members: &[u32]) -> Vec<PlanarChart> {
 /// No chart has the triangle yet.
 const FREE: u32 = u32::MAX;
 
-/// No triangle beyond the side, or more than one.
+/// No triangle beyond the edge, or more than one.
 const NONE: u32 = u32::MAX;
 
-/// For each member the members beyond its sides.
+/// For each member the members beyond its edges.
 fn neighbours(mesh: &Mesh, members: &[u32]) -> Vec<[u32; 3]> {
-    let mut sides: Vec<([u32; 2], u32, u32)> = Vec::with_capacity(members.len() * 3);
-    for (place, &number) in members.iter().enumerate() {
+    let mut edges: Vec<([u32; 2], u32, u32)> = Vec::with_capacity(members.len() * 3);
+    for (index, &number) in members.iter().enumerate() {
         let [a, b, c] = mesh.triangles[number as usize];
-        for (side, [from, to]) in [[a, b], [b, c], [c, a]].into_iter().enumerate() {
-            sides.push(([from.min(to), from.max(to)], place as u32, side as u32));
+        for (edge, [from, to]) in [[a, b], [b, c], [c, a]].into_iter().enumerate() {
+            edges.push(([from.min(to), from.max(to)], index as u32, edge as u32));
         }
     }
-    sides.sort_unstable();
+    edges.sort_unstable();
     let mut neighbours = vec![[NONE; 3]; members.len()];
-    for pair in sides.chunk_by(|a, b| a.0 == b.0) {
-        if let &[(_, a, side_a), (_, b, side_b)] = pair {
-            neighbours[a as usize][side_a as usize] = b;
-            neighbours[b as usize][side_b as usize] = a;
+    for pair in edges.chunk_by(|a, b| a.0 == b.0) {
+        if let &[(_, a, edge_a), (_, b, edge_b)] = pair {
+            neighbours[a as usize][edge_a as usize] = b;
+            neighbours[b as usize][edge_b as usize] = a;
         }
     }
     neighbours
@@ -192,7 +192,7 @@ fn absorb(
                 .map(|&triangle| cosine(normals[triangle as usize], mean))
                 .fold(1.0, f64::min);
             if worst >= LEAST_FACING
-                && best.is_none_or(|(sides, cosine, _)| (group.len(), worst) > (sides, cosine))
+                && best.is_none_or(|(edges, cosine, _)| (group.len(), worst) > (edges, cosine))
             {
                 best = Some((group.len(), worst, other));
             }

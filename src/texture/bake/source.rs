@@ -20,17 +20,17 @@ const ALONG: f64 = 0.5;
 #[derive(Debug)]
 pub(crate) struct Source {
     surface: Surface,
-    looks: Vec<TriangleLook>,
+    triangles: Vec<SourceTriangle>,
 }
 
 /// What a triangle of the original shows.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TriangleLook {
+pub(crate) struct SourceTriangle {
     /// Unit length.
     pub normal: DVec3,
     /// Texture of the model.
     pub texture: u32,
-    /// Positions of the corners in the part of the picture that the block uses, source texels.
+    /// Positions of the corners in the part of the image that the block uses, source texels.
     pub texels: [[f32; 2]; 3],
     /// Vertex colours of the corners.
     pub colors: Option<[[u16; 4]; 3]>,
@@ -38,9 +38,9 @@ pub(crate) struct TriangleLook {
     pub density: f64,
 }
 
-/// A place on the original.
+/// A point of the original.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct SurfacePoint {
     pub triangle: u32,
     pub weights: [f64; 3],
     /// From where it was looked for, metres.
@@ -56,7 +56,7 @@ impl Source {
         texels: impl Fn([u32; 3]) -> Option<(u32, [[f64; 2]; 3])>,
     ) -> Self {
         let mut triangles = Vec::new();
-        let mut looks = Vec::new();
+        let mut sources = Vec::new();
         for &triangle in &mesh.triangles {
             if classes.of(mesh.triangle_material(triangle)).is_none() {
                 continue;
@@ -67,7 +67,7 @@ impl Source {
             let [p, q, r] = texels.map(glam::DVec2::from);
             let texel_area = (q - p).perp_dot(r - p).abs();
             let colored = !mesh.colors.is_empty();
-            looks.push(TriangleLook {
+            sources.push(SourceTriangle {
                 normal: cross.normalize_or_zero(),
                 texture,
                 texels: texels.map(|corner| corner.map(|value| value as f32)),
@@ -77,38 +77,46 @@ impl Source {
             triangles.push(triangle);
         }
         let positions = mesh.positions.iter().map(|&position| wide(position)).collect();
-        Self { surface: Surface::new(positions, triangles), looks }
+        Self { surface: Surface::new(positions, triangles), triangles: sources }
     }
 
-    /// The place nearest to `point` on a surface with this unit normal. The search begins at the
+    /// The point nearest to `point` on a surface with this unit normal. The search begins at the
     /// triangle of `near`, and ends there where the point lies over it and is not farther from it
     /// than `near` was by more than `slack`.
     pub fn nearest(
         &self,
         point: DVec3,
         normal: DVec3,
-        near: Option<Place>,
+        near: Option<SurfacePoint>,
         slack: f64,
-    ) -> Option<Place> {
-        if let Some(Place { triangle, distance, .. }) = near
-            && self.looks[triangle as usize].normal.dot(normal) >= ALONG
+    ) -> Option<SurfacePoint> {
+        if let Some(SurfacePoint { triangle, distance, .. }) = near
+            && self.triangles[triangle as usize].normal.dot(normal) >= ALONG
         {
             let hit = self.surface.on_triangle(point, triangle);
             if hit.distance() <= distance + slack && hit.weights.iter().all(|&weight| weight > 0.0)
             {
-                return Some(Place { triangle, weights: hit.weights, distance: hit.distance() });
+                return Some(SurfacePoint {
+                    triangle,
+                    weights: hit.weights,
+                    distance: hit.distance(),
+                });
             }
         }
         let away = |triangle: u32| {
-            let cosine = self.looks[triangle as usize].normal.dot(normal);
+            let cosine = self.triangles[triangle as usize].normal.dot(normal);
             if cosine < 0.0 { AWAY } else { 1.0 + ASIDE * (1.0 - cosine) }
         };
         let hit = self.surface.closest_of(point, near.map(|near| near.triangle), away)?;
-        Some(Place { triangle: hit.triangle, weights: hit.weights, distance: hit.distance() })
+        Some(SurfacePoint {
+            triangle: hit.triangle,
+            weights: hit.weights,
+            distance: hit.distance(),
+        })
     }
 
     /// What a triangle shows.
-    pub fn look(&self, triangle: u32) -> &TriangleLook {
-        &self.looks[triangle as usize]
+    pub fn triangle(&self, triangle: u32) -> &SourceTriangle {
+        &self.triangles[triangle as usize]
     }
 }

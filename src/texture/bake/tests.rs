@@ -10,21 +10,21 @@ use crate::format::{NodeImageData, NodeMesh};
 use crate::mesh::{Group, Material, Mesh, Model, Part, TextureData, TextureSource};
 use crate::random::Random;
 use crate::texture::{
-    BlockTextures, Seams, SharedTextures, TextureCache, TextureOptions, TexturePlan,
+    AppendedSkirts, BlockTextures, Seams, SharedTextures, TextureCache, TextureOptions, TexturePlan,
 };
 
 /// A surface over a grid of `side` by `side` squares, without texture.
 fn sheet(side: u32, at: impl Fn(f64, f64) -> DVec3) -> Mesh {
     let mut mesh = Mesh::default();
-    for place in 0..(side + 1) * (side + 1) {
+    for position in 0..(side + 1) * (side + 1) {
         let [u, v] =
-            [place / (side + 1), place % (side + 1)].map(|i| f64::from(i) / f64::from(side));
+            [position / (side + 1), position % (side + 1)].map(|i| f64::from(i) / f64::from(side));
         mesh.positions.push(at(u, v).as_vec3().into());
         mesh.texcoords.push([0.0; 2]);
         mesh.materials.push(0);
     }
-    for place in (0..side * (side + 1)).filter(|place| place % (side + 1) != side) {
-        let [a, b, c, d] = [0, side + 1, side + 2, 1].map(|step| place + step);
+    for position in (0..side * (side + 1)).filter(|position| position % (side + 1) != side) {
+        let [a, b, c, d] = [0, side + 1, side + 2, 1].map(|step| position + step);
         mesh.triangles.extend([[a, b, c], [a, c, d]]);
     }
     mesh
@@ -103,10 +103,10 @@ fn flat_charts_do_not_lie_on_themselves() {
     }
 }
 
-/// Texels along the sides of a square's place in the picture.
+/// Texels along the sides of a square's position in the image.
 const TEXELS: usize = 16;
 
-/// A mesh of squares, each a chart of its own somewhere in the picture, and that picture, in which
+/// A mesh of squares, each a chart of its own somewhere in the image, and that image, in which
 /// each point of the surface has its `color`, given itself and the middle of its square.
 fn torn(mesh: &Mesh, color: impl Fn(DVec3, DVec3) -> [u8; 3]) -> (Model, Mesh) {
     let squares = mesh.triangles.len() / 2;
@@ -115,9 +115,9 @@ fn torn(mesh: &Mesh, color: impl Fn(DVec3, DVec3) -> [u8; 3]) -> (Model, Mesh) {
     let mut pixels = vec![255; side * side * 3];
     let mut torn = Mesh::default();
     for (square, triangles) in mesh.triangles.chunks(2).enumerate() {
-        // A large prime visits each place once.
-        let place = (square * 7919) % (columns * columns);
-        let [column, row] = [place % columns * TEXELS, place / columns * TEXELS];
+        // A large prime visits each position once.
+        let position = (square * 7919) % (columns * columns);
+        let [column, row] = [position % columns * TEXELS, position / columns * TEXELS];
         let [a, b, c] = mesh.corners(triangles[0]);
         let d = mesh.corners(triangles[1])[2];
         // Corners are half a texel inside, as atlases without gutters have them.
@@ -127,12 +127,12 @@ fn torn(mesh: &Mesh, color: impl Fn(DVec3, DVec3) -> [u8; 3]) -> (Model, Mesh) {
             let texel = color(point, (a + c) * 0.5);
             pixels[((row + y) * side + column + x) * 3..][..3].copy_from_slice(&texel);
         }
-        let places = [[0, 0], [1, 0], [1, 1], [0, 1]];
+        let ends = [[0, 0], [1, 0], [1, 1], [0, 1]];
         for (triangle, corners) in triangles.iter().zip([[0, 1, 2], [0, 2, 3]]) {
             let first = torn.positions.len() as u32;
             for (&vertex, corner) in triangle.iter().zip(corners) {
                 let own = torn.push_vertex_from(mesh, vertex as usize);
-                let [x, y] = places[corner].map(|end| 0.5 + (end * (TEXELS - 1)) as f32);
+                let [x, y] = ends[corner].map(|end| 0.5 + (end * (TEXELS - 1)) as f32);
                 let texel = [column as f32 + x, row as f32 + y];
                 torn.texcoords[own as usize] = texel.map(|at| at / side as f32);
             }
@@ -178,7 +178,7 @@ fn bake(model: &Model, mesh: &Mesh, coarse: &Mesh) -> NodeMesh {
     let options = TextureOptions { jpeg_quality: 100, seams: Seams::Bake, ..Default::default() };
     let block = BlockTextures::prepare(&cache, &shared, mesh, &[16.0, 4.0, 1.0], options);
     let baked = block.bake(coarse, 1).expect("bakes");
-    block.baked_node_mesh(&baked, &[], 1, [0.0; 3]).expect("builds").mesh
+    block.baked_node_mesh(&baked, &AppendedSkirts::default(), 1, [0.0; 3]).expect("builds").mesh
 }
 
 /// A page, and its half: the mip level that its gutters promise.
@@ -196,7 +196,7 @@ fn pages(mesh: &NodeMesh) -> [image::RgbImage; 2] {
     [page, half]
 }
 
-/// Bilinear sampling of a picture whose sides meet, as renderers do it.
+/// Bilinear sampling of an image whose sides meet, as renderers do it.
 fn sample(page: &image::RgbImage, uv: [f64; 2]) -> [f64; 3] {
     let size = [page.width(), page.height()].map(f64::from);
     let at = [0, 1].map(|axis| uv[axis] * size[axis] - 0.5);
@@ -250,7 +250,7 @@ fn greatest(node: &NodeMesh, color: impl Fn(DVec3) -> [u8; 3]) -> [f64; 2] {
 }
 
 #[test]
-fn a_flat_square_in_many_charts_shows_its_picture_again() {
+fn a_flat_square_in_many_charts_shows_its_image_again() {
     let wave = |point: DVec3| {
         [point.x * 3.0, point.y * 2.0, point.x + point.y]
             .map(|turn| (128.0 + 90.0 * libm::sin(turn * std::f64::consts::TAU)) as u8)

@@ -22,7 +22,7 @@ pub fn sample(triangles: &[Triangle], count: usize, random: &mut Random) -> Vec<
     }
     (0..count)
         .map(|_| {
-            let at = random.within(0.0, sum);
+            let at = random.between(0.0, sum);
             let number = sums.partition_point(|&upto| upto < at).min(triangles.len() - 1);
             let [a, b, c] = triangles[number];
             let [x, y, z] = barycentric(random);

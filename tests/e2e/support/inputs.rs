@@ -39,11 +39,11 @@ pub const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n
 /// A hilly street: `side` by `side` quads of 1 m with a repeating picture, each fourth row with
 /// a cut-out one, each seventh without, beside loose coloured triangles.
 pub fn write_street(folder: &Path, side: usize) -> PathBuf {
-    let mut random = Random(11);
+    let mut random = Random::new(11, 0);
     let mut text = String::from("mtllib street.mtl\n");
     for i in 0..=side {
         for j in 0..=side {
-            let z = random.within(0.0, 0.2);
+            let z = random.between(0.0, 0.2);
             let _ = writeln!(text, "v {i} {j} {z:.4}\nvt {} {}", i as f64 * 0.5, j as f64 * 0.25);
         }
     }
@@ -63,9 +63,9 @@ pub fn write_street(folder: &Path, side: usize) -> PathBuf {
     let first = (side + 1) * (side + 1) + 1;
     let _ = writeln!(text, "g loose\nusemtl plain");
     for n in 0..400 {
-        let centre: [f64; 3] = std::array::from_fn(|_| random.within(0.0, side as f64));
+        let centre: [f64; 3] = std::array::from_fn(|_| random.between(0.0, side as f64));
         for _ in 0..3 {
-            let [x, y, z] = centre.map(|c| c + random.within(-1.0, 1.0));
+            let [x, y, z] = centre.map(|c| c + random.between(-1.0, 1.0));
             let [r, g, b]: [f64; 3] = std::array::from_fn(|_| random.unit());
             let _ = writeln!(text, "v {x:.4} {y:.4} {z:.4} {r:.3} {g:.3} {b:.3}");
         }
@@ -94,14 +94,14 @@ pub fn write_street(folder: &Path, side: usize) -> PathBuf {
 
 /// A soup: triangles of all sizes, some twice, some mirrored, some without area, all in one group.
 pub fn write_soup(folder: &Path, triangles: usize, seed: u64) -> PathBuf {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed, 0);
     let mut text = String::new();
     let mut corners: Vec<[f64; 3]> = Vec::new();
     for _ in 0..triangles {
-        let size = 10f64.powf(random.within(-2.0, 0.7));
-        let centre: [f64; 3] = std::array::from_fn(|_| random.within(0.0, 40.0));
+        let size = 10f64.powf(random.between(-2.0, 0.7));
+        let centre: [f64; 3] = std::array::from_fn(|_| random.between(0.0, 40.0));
         let made: [[f64; 3]; 3] =
-            std::array::from_fn(|_| centre.map(|c| c + random.within(-size, size)));
+            std::array::from_fn(|_| centre.map(|c| c + random.between(-size, size)));
         let last = corners.len().saturating_sub(3);
         match random.below(20) {
             0 if corners.len() >= 3 => corners.extend_from_within(last..),

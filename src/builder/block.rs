@@ -1,0 +1,342 @@
+//! From one imported model to the trees of its blocks.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::Result;
+use crate::builder::blocks::gather::{divide, gather, localise};
+use crate::builder::blocks::merge_untextured::merge_untextured;
+use crate::builder::blocks::outliers::set_outliers_aside;
+use crate::builder::blocks::plan::{BlockPlan, Division, plan};
+use crate::builder::border::shared::{keep_shared, shared_positions};
+use crate::builder::cut::split::Chunk;
+use crate::builder::emit::disk_sink::{DiskSink, NodeRecord};
+use crate::builder::hierarchy::{BlockBuilder, Resolutions, Tree};
+use crate::builder::options::BuildOptions;
+use crate::builder::pipeline::in_parallel;
+use crate::builder::progress::Progress;
+use crate::builder::simplify::orient::reorientable;
+use crate::builder::stages::{Stage, Stages};
+use crate::format::{BlockInfo, Encoding, OutputDir};
+use crate::lattice::Lattice;
+use crate::lattice::Quantization;
+use crate::mesh::{Material, Model, Part, UpAxis, Warnings};
+use crate::texture::{
+    BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan, texture_factors,
+};
+
+/// A block whose nodes are written.
+#[derive(Debug)]
+pub struct BuiltBlock {
+    /// For `scene.hlod`.
+    pub info: BlockInfo,
+    /// Its nodes.
+    pub tree: Tree<NodeRecord>,
+}
+
+impl BuiltBlock {
+    /// Visits all records, parents first.
+    pub fn for_each<'a>(&'a self, visit: &mut impl FnMut(&'a NodeRecord)) {
+        fn down<'a>(tree: &'a Tree<NodeRecord>, visit: &mut impl FnMut(&'a NodeRecord)) {
+            visit(&tree.record);
+            tree.children.iter().for_each(|child| down(child, visit));
+        }
+        down(&self.tree, visit);
+    }
+}
+
+/// The blocks of one input.
+pub struct BuiltInput {
+    /// In the order of the source.
+    pub blocks: Vec<BuiltBlock>,
+    /// Different source texels that its triangles use, repeating textures aside.
+    pub used_texels: u64,
+    /// What was imperfect.
+    pub warnings: Warnings,
+}
+
+/// A block about to be gathered.
+struct Draft {
+    name: String,
+    /// Strays, on a lattice of their own.
+    far: bool,
+    source: DraftSource,
+    materials: Vec<u32>,
+}
+
+enum DraftSource {
+    Parts(Vec<Part>),
+    Chunk(Box<Chunk<f64>>),
+}
+
+impl DraftSource {
+    fn positions(&self) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
+        match self {
+            Self::Parts(parts) => {
+                Box::new(parts.iter().flat_map(|part| part.positions.iter().copied()))
+            }
+            Self::Chunk(chunk) => Box::new(chunk.mesh.positions.iter().copied()),
+        }
+    }
+
+    /// Positions that no cut made: those on a cutting plane are the plane's business.
+    fn uncut_positions(&self) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
+        match self {
+            Self::Parts(_) => self.positions(),
+            Self::Chunk(chunk) => Box::new(
+                chunk
+                    .mesh
+                    .positions
+                    .iter()
+                    .zip(&chunk.border.planes)
+                    .filter(|(_, planes)| **planes == 0)
+                    .map(|(position, _)| *position),
+            ),
+        }
+    }
+
+    fn bounds(&self) -> ([f64; 3], [f64; 3]) {
+        let empty = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        self.positions().fold(empty, |(low, high), p| {
+            (std::array::from_fn(|i| low[i].min(p[i])), std::array::from_fn(|i| high[i].max(p[i])))
+        })
+    }
+}
+
+/// Whether charts of their own fit into the atlases of nodes: each takes cells of up to 8 by 8
+/// texels, and a node has hardly more charts than triangles.
+fn has_room_for_charts(options: &BuildOptions) -> bool {
+    let cells = (u64::from(options.max_atlas) / 8).pow(2);
+    cells >= 4 * u64::from(options.hierarchy.desired_tris).max(1000)
+}
+
+/// Builds all blocks of a model and writes their nodes.
+pub fn build_input(
+    mut model: Model,
+    up: UpAxis,
+    options: &BuildOptions,
+    out: &OutputDir,
+    shared: &SharedTextures,
+    stages: &Stages,
+    progress: &dyn Progress,
+) -> Result<BuiltInput> {
+    let mut warnings = std::mem::take(&mut model.warnings);
+    let quantization = options.quantization();
+    if let Some(quantization) = quantization {
+        let collapsed = stages.time(Stage::Gather, || quantization.snap(&mut model));
+        let (source, step) = (model.source.display(), quantization.step);
+        let what = format!("{source}: triangle thinner than the lattice of {step} m left out");
+        warnings.add(what, collapsed);
+        progress.built(collapsed);
+    }
+    merge_untextured(&mut model);
+    let plans = plan(&model, options.blocks, options.hierarchy.desired_tris, up);
+    let texture_plan = TexturePlan::new(&model);
+    let drafts = drafts(&mut model, plans, options, stages);
+    let lattice_of = |drafts: &mut dyn Iterator<Item = &Draft>| {
+        let fine = lattice_of(drafts);
+        if let Some(Quantization { step }) = quantization.filter(|coarse| coarse.step < fine.step) {
+            let what = format!(
+                "{}: blocks too large for steps of {step} m; rounded to {} m",
+                model.source.display(),
+                fine.step
+            );
+            return (fine, Some(what));
+        }
+        (fine.or_coarser(quantization), None)
+    };
+    let (common, coarse) = lattice_of(&mut drafts.iter().filter(|draft| !draft.far));
+    if let Some(what) = coarse {
+        warnings.add(what, 1);
+    }
+    let shared_vertices = stages.time(Stage::Gather, || {
+        let bounds: Vec<_> = drafts.iter().map(|draft| draft.source.bounds()).collect();
+        shared_positions(&bounds, |block| drafts[block].source.uncut_positions())
+    });
+    let cache = TextureCache::new(
+        &model,
+        &texture_plan,
+        drafts.iter().map(|draft| draft.materials.iter().copied()),
+    );
+    let reorientable: Vec<bool> = model.materials.iter().map(reorientable).collect();
+    let prefix = file_prefix(&model.source);
+    let mut hierarchy = options.hierarchy.clone();
+    if quantization.is_some() {
+        // Vertices are beside their planes by steps that show.
+        hierarchy.tolerance.sliver_steps = hierarchy.tolerance.sliver_steps.min(1.0);
+    }
+    let built = in_parallel(drafts, |number, draft| {
+        let (lattice, coarse) =
+            if draft.far { lattice_of(&mut [&draft].into_iter()) } else { (common, None) };
+        let Draft { name, source, .. } = draft;
+        let (low, high) = source.bounds();
+        let origin = lattice.origin_near(std::array::from_fn(|i| (low[i] + high[i]) * 0.5));
+        let (chunk, collapsed) = stages.time(Stage::Gather, || {
+            let mut chunk = match source {
+                DraftSource::Parts(parts) => gather(&model.materials, &parts),
+                DraftSource::Chunk(chunk) => *chunk,
+            };
+            keep_shared(&mut chunk, &shared_vertices);
+            localise(chunk, origin, lattice, quantization.is_some())
+        });
+        let mut warnings = Warnings::default();
+        if let Some(what) = coarse {
+            warnings.add(what, 1);
+        }
+        warnings.add(
+            format!(
+                "{}: triangle thinner than the precision of its block ({:e} m) left out",
+                model.source.display(),
+                lattice.step
+            ),
+            collapsed,
+        );
+        if chunk.mesh.triangles.is_empty() {
+            progress.built(collapsed);
+            return Ok((None, warnings, 0));
+        }
+        let resolutions = Resolutions::new(chunk.mesh.triangles.len(), &options.hierarchy);
+        let factors = resolutions.factors();
+        let texture_options = TextureOptions {
+            jpeg_quality: options.jpeg_quality,
+            max_atlas: options.max_atlas,
+            seams: options.hierarchy.seams,
+            root_triangles: (chunk.mesh.triangles.len() as f64 / factors[0]) as usize,
+        };
+        let textures = stages.time(Stage::Pictures, || {
+            let level_factor = f64::from(options.hierarchy.level_factor);
+            let texel_factors = texture_factors(factors, level_factor);
+            BlockTextures::prepare(&cache, shared, &chunk.mesh, &texel_factors, texture_options)
+        });
+        let sink = DiskSink {
+            textures: &textures,
+            out,
+            prefix: format!("{prefix}-{number:04}"),
+            origin,
+            up,
+            encoding: Encoding {
+                step: quantization.map(|quantization| quantization.step),
+                compress: options.compress,
+            },
+            textured_weight: options.textured_weight,
+            stages,
+            progress,
+        };
+        let builder = BlockBuilder {
+            options: &hierarchy,
+            resolutions,
+            bake: textures.bake_plan().filter(|_| has_room_for_charts(options)),
+            lattice,
+            quantization,
+            up,
+            reorientable: &reorientable,
+            sink: &sink,
+            stages,
+        };
+        let tree = builder.build(chunk)?;
+        let info =
+            BlockInfo { name, input: crate::builder::inputs::text_of(&model.source), origin };
+        Ok((Some(BuiltBlock { info, tree }), warnings, textures.used_texels()))
+    })?;
+    let mut blocks = Vec::with_capacity(built.len());
+    let mut used_texels = 0;
+    for (block, block_warnings, texels) in built {
+        blocks.extend(block);
+        warnings.extend(block_warnings);
+        used_texels += texels;
+    }
+    warnings.extend(cache.warnings());
+    Ok(BuiltInput { blocks, used_texels, warnings })
+}
+
+/// Takes the parts out of the model and divides those blocks that are to be divided.
+fn drafts(
+    model: &mut Model,
+    plans: Vec<BlockPlan>,
+    options: &BuildOptions,
+    stages: &Stages,
+) -> Vec<Draft> {
+    let mut parts: Vec<Option<Part>> =
+        std::mem::take(&mut model.parts).into_iter().map(Some).collect();
+    let planned: Vec<(BlockPlan, Vec<Part>)> = plans
+        .into_iter()
+        .map(|plan| {
+            let parts = plan.parts.iter().filter_map(|&number| parts[number].take()).collect();
+            (plan, parts)
+        })
+        .collect();
+    let drafts_of = |(plan, parts)| drafts_of_plan(&model.materials, plan, parts, options, stages);
+    let drafts: Vec<Vec<Draft>> = planned.into_par_iter().map(drafts_of).collect();
+    drafts.into_iter().flatten().collect()
+}
+
+fn drafts_of_plan(
+    materials: &[Material],
+    BlockPlan { name, divide: division, .. }: BlockPlan,
+    parts: Vec<Part>,
+    options: &BuildOptions,
+    stages: &Stages,
+) -> Vec<Draft> {
+    let mut drafts = Vec::new();
+    let stray = stages.time(Stage::Gather, || set_outliers_aside(&parts));
+    let (parts, far) = stray.unwrap_or((parts, Vec::new()));
+    if !far.is_empty() {
+        let name = format!("{name} (far off)");
+        let materials = materials_of(far.iter().map(|part| part.material).collect());
+        drafts.push(Draft { name, far: true, source: DraftSource::Parts(far), materials });
+    }
+    if division == Division::Whole {
+        let materials = materials_of(parts.iter().map(|part| part.material).collect());
+        drafts.push(Draft { name, far: false, source: DraftSource::Parts(parts), materials });
+        return drafts;
+    }
+    let mut chunk = stages.time(Stage::Gather, || gather(materials, &parts));
+    drop(parts);
+    chunk.moved = options.quantize.map(|_| vec![0.0; chunk.mesh.positions.len()]);
+    let most = match division {
+        Division::Halves { most } => most,
+        Division::Whole | Division::Grid { .. } => chunk.mesh.triangles.len(),
+    };
+    // The blocks' own factors are not known yet; those of the largest serve all.
+    let resolutions = Resolutions::new(most.min(chunk.mesh.triangles.len()), &options.hierarchy);
+    let shares: Vec<f64> = resolutions.factors().iter().map(|factor| 1.0 / factor.sqrt()).collect();
+    let chunks = divide(chunk, division, &shares, options.quantization(), stages);
+    let several = chunks.len() > 1;
+    for (number, chunk) in chunks.into_iter().enumerate() {
+        let materials = materials_of(chunk.mesh.materials.clone());
+        let name = if several { format!("{name} {}", number + 1) } else { name.clone() };
+        let source = DraftSource::Chunk(Box::new(chunk));
+        drafts.push(Draft { name, far: false, source, materials });
+    }
+    drafts
+}
+
+/// Each material once.
+fn materials_of(mut materials: Vec<u32>) -> Vec<u32> {
+    materials.sort_unstable();
+    materials.dedup();
+    materials
+}
+
+/// One lattice for all blocks of an input, so that blocks that touch agree on where.
+fn lattice_of<'a>(drafts: impl IntoIterator<Item = &'a Draft>) -> Lattice {
+    let (mut extent, mut magnitude) = (0f64, 0f64);
+    for draft in drafts {
+        let (low, high) = draft.source.bounds();
+        for i in 0..3 {
+            extent = extent.max(high[i] - low[i]);
+            magnitude = magnitude.max(low[i].abs()).max(high[i].abs());
+        }
+    }
+    Lattice::for_extent(extent, magnitude)
+}
+
+/// The beginning of an input's file names: its name for people, a hash of its path for programs.
+fn file_prefix(input: &Path) -> String {
+    let stem = input.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    let plain: String =
+        stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(40).collect();
+    let hash = blake3::hash(crate::builder::inputs::text_of(input).as_bytes()).to_hex();
+    format!("{plain}-{}", &hash.as_str()[..6])
+}

@@ -1,0 +1,216 @@
+//! Gathering a block's geometry from the parts of a model: welded, in f64, then on its lattice.
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use crate::builder::blocks::plan::Division;
+use crate::builder::border::chain::{Chain, CutPlane, KeepRule};
+use crate::builder::border::vertex::{Border, Path};
+use crate::builder::cut::plane::{Region, best_plane};
+use crate::builder::cut::split::{Chunk, Cut, CutTolerance, cut};
+use crate::builder::cut::uncut::UncutComponents;
+use crate::builder::stages::{Stage, Stages};
+use crate::lattice::Lattice;
+use crate::lattice::Quantization;
+use crate::mesh::{Material, Mesh, Part, PositionKey, all_differ, color_key, key, texcoord_key};
+
+/// What makes two source vertices one.
+type VertexKey = (PositionKey<f64>, u64, u64, u32);
+
+/// Joins parts into one chunk; vertices that are equal in position, texture coordinate, colour
+/// and material become one.
+pub fn gather(materials: &[Material], parts: &[Part]) -> Chunk<f64> {
+    let textured = |part: &Part| {
+        materials[part.material as usize].texture.is_some() && !part.texcoords.is_empty()
+    };
+    let any_textured = parts.iter().any(textured);
+    let any_colored = parts.iter().any(|part| !part.colors.is_empty());
+    let mut mesh = Mesh::<f64>::default();
+    let total: usize = parts.iter().map(|part| part.indices.len() / 3).sum();
+    mesh.triangles.reserve_exact(total);
+    let mut welded: FxHashMap<VertexKey, u32> = FxHashMap::default();
+    welded.reserve(total / 2);
+    let mut new_index: Vec<u32> = Vec::new();
+    for part in parts {
+        let has_texcoords = textured(part);
+        new_index.clear();
+        new_index.extend((0..part.positions.len()).map(|vertex| {
+            let position = part.positions[vertex].map(|coordinate| coordinate + 0.0);
+            let texcoord = if has_texcoords { part.texcoords[vertex] } else { [0.0; 2] };
+            let color = part.colors.get(vertex).copied().unwrap_or([u16::MAX; 4]);
+            let same = (key(position), texcoord_key(texcoord), color_key(color), part.material);
+            *welded.entry(same).or_insert_with(|| {
+                mesh.positions.push(position);
+                if any_textured {
+                    mesh.texcoords.push(texcoord);
+                }
+                if any_colored {
+                    mesh.colors.push(color);
+                }
+                mesh.materials.push(part.material);
+                mesh.positions.len() as u32 - 1
+            })
+        }));
+        for corners in part.indices.as_chunks::<3>().0 {
+            mesh.triangles.push(corners.map(|vertex| new_index[vertex as usize]));
+        }
+    }
+    let border = Border::interior(mesh.positions.len());
+    Chunk { mesh, border, ..Chunk::default() }
+}
+
+/// Cuts a gathered chunk into the blocks of a [`Division`], in a fixed order.
+pub fn divide(
+    chunk: Chunk<f64>,
+    division: Division,
+    shares: &[f64],
+    quantization: Option<Quantization>,
+    stages: &Stages,
+) -> Vec<Chunk<f64>> {
+    let lattice = quantization.map(|Quantization { step }| Lattice { step });
+    let rule = KeepRule {
+        shares: shares.to_vec(),
+        most: Vec::new(),
+        first_level: 0,
+        collinear: 0.0,
+        baked: None,
+    };
+    let mut done = Vec::new();
+    match division {
+        Division::Whole => done.push(chunk),
+        Division::Halves { most } => return halves(chunk, most, &rule, lattice, stages),
+        Division::Grid { metres, axes } => {
+            let mut stack = vec![chunk];
+            while let Some(chunk) = stack.pop() {
+                match grid_line(&chunk.mesh, metres, axes).filter(|_| chunk.path.len() < 40) {
+                    None => done.push(chunk),
+                    Some((axis, line)) => {
+                        let (below, above) = stages.time(Stage::Gather, || {
+                            cut_at(chunk, axis, line, UncutComponents::default(), &rule, lattice)
+                        });
+                        if below.mesh.triangles.is_empty() || above.mesh.triangles.is_empty() {
+                            // Everything was on one side but for a vertex within tolerance.
+                            done.extend(
+                                [below, above].into_iter().filter(|p| !p.mesh.triangles.is_empty()),
+                            );
+                        } else {
+                            stack.extend([above, below]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    done
+}
+
+/// A separate body with more than this share of a block's triangles is cut.
+const BODIES_PER_BLOCK: usize = 32;
+
+/// Halves a chunk ([`crate::builder::cut::axis`]) until no part of it has more than `most` triangles.
+fn halves(
+    chunk: Chunk<f64>,
+    most: usize,
+    rule: &KeepRule,
+    lattice: Option<Lattice>,
+    stages: &Stages,
+) -> Vec<Chunk<f64>> {
+    let triangles = chunk.mesh.triangles.len();
+    if triangles == 0 {
+        return Vec::new();
+    }
+    let Some((low, high)) = chunk.mesh.bounds().filter(|_| triangles > most) else {
+        return vec![chunk];
+    };
+    let region = Region { low, high, share: 0.5 };
+    let plane = stages.time(Stage::Gather, || best_plane(&chunk.mesh, &region));
+    let Some((axis, middle)) = plane.filter(|_| chunk.path.len() < 12) else { return vec![chunk] };
+    let middle = lattice.map_or(middle, |lattice| lattice.round(middle));
+    let whole = UncutComponents::in_slabs((high[axis] - low[axis]) * 0.5, most / BODIES_PER_BLOCK);
+    let (below, above) =
+        stages.time(Stage::Gather, || cut_at(chunk, axis, middle, whole, rule, lattice));
+    let (mut done, above) = rayon::join(
+        || halves(below, most, rule, lattice, stages),
+        || halves(above, most, rule, lattice, stages),
+    );
+    done.extend(above);
+    done
+}
+
+fn cut_at(
+    chunk: Chunk<f64>,
+    axis: usize,
+    at: f64,
+    whole: UncutComponents,
+    rule: &KeepRule,
+    lattice: Option<Lattice>,
+) -> (Chunk<f64>, Chunk<f64>) {
+    // As within blocks, where the lattice shows: source vertices that the plane runs through are on
+    // it, and what meets when it is rounded meets here.
+    let coordinate = lattice.map_or(at, |lattice| lattice.round(at));
+    let tolerance = CutTolerance { sliver_steps: 1.0, ..CutTolerance::default() };
+    cut(chunk, &Cut { axis, coordinate, lattice, tolerance, whole, rule })
+}
+
+/// The grid line nearest to the middle of the longer of the two sides that spans several squares.
+/// What reaches less than a hundredth of a square beyond a line counts as within it.
+fn grid_line(mesh: &Mesh<f64>, metres: f64, axes: [usize; 2]) -> Option<(usize, f64)> {
+    let (low, high) = mesh.bounds()?;
+    let slack = metres * 0.01;
+    let squares = |axis: usize| {
+        let first = ((low[axis] + slack) / metres).floor();
+        let last = ((high[axis] - slack) / metres).ceil();
+        (first, (last - first).max(1.0))
+    };
+    let axis = if squares(axes[0]).1 >= squares(axes[1]).1 { axes[0] } else { axes[1] };
+    let (first, count) = squares(axis);
+    (count > 1.0).then(|| (axis, (first + (count / 2.0).floor()) * metres))
+}
+
+/// Brings a chunk to its block's origin and lattice; triangles that collapse on the lattice are
+/// dropped and counted. Where `follow` says so, the chunk remembers how far vertices were moved.
+pub fn localise(
+    chunk: Chunk<f64>,
+    origin: [f64; 3],
+    lattice: Lattice,
+    follow: bool,
+) -> (Chunk, u64) {
+    let local = |position: [f64; 3]| -> [f32; 3] {
+        std::array::from_fn(|i| lattice.offset(position[i], origin[i]) + 0.0)
+    };
+    let Chunk { mesh, border, path: wide_path, moved } = chunk;
+    let moved = follow.then(|| {
+        let off = |p: &[f64; 3]| {
+            p.map(|c| (lattice.round(c) - c).powi(2)).iter().sum::<f64>().sqrt() as f32
+        };
+        let before = moved.into_iter().flatten().chain(std::iter::repeat(0.0));
+        mesh.positions.iter().zip(before).map(|(at, before)| (before + off(at)).next_up()).collect()
+    });
+    let mut mesh = Mesh {
+        positions: mesh.positions.iter().map(|&position| local(position)).collect(),
+        texcoords: mesh.texcoords,
+        colors: mesh.colors,
+        materials: mesh.materials,
+        triangles: mesh.triangles,
+    };
+    let before = mesh.triangles.len();
+    let positions = &mesh.positions;
+    mesh.triangles.retain(|corners| all_differ(corners.map(|vertex| positions[vertex as usize])));
+    let dropped = (before - mesh.triangles.len()) as u64;
+    let mut path = Path::default();
+    for bit in 0..wide_path.len() as u32 {
+        let plane = wide_path.plane(bit);
+        let chains = plane
+            .chains
+            .iter()
+            .map(|chain| Chain {
+                positions: chain.positions.iter().map(|&position| local(position)).collect(),
+                keep: chain.keep.clone(),
+            })
+            .collect();
+        let coordinate = lattice.offset(plane.coordinate, origin[plane.axis]);
+        path = path.with(Arc::new(CutPlane::from_chains(plane.axis, coordinate, chains)));
+    }
+    (Chunk { mesh, border, path, moved }, dropped)
+}

@@ -1,0 +1,100 @@
+//! Untextured materials that differ in colour only become one material with vertex colours.
+//!
+//! A border between two colours is no reason to keep an edge from collapsing when seen from afar,
+//! as a border between two textures is; and one material is one draw.
+
+use crate::mesh::{AlphaMode, Material, Model};
+
+/// Folds each class of untextured materials that look alike but for their colour.
+pub fn merge_untextured(model: &mut Model) {
+    let foldable = |material: &Material| {
+        material.texture.is_none() && !matches!(material.alpha, AlphaMode::Mask { .. })
+    };
+    let class = |material: &Material| (material.alpha == AlphaMode::Blend, material.double_sided);
+    for sought in [(false, false), (false, true), (true, false), (true, true)] {
+        let in_class: Vec<bool> = model
+            .materials
+            .iter()
+            .map(|material| foldable(material) && class(material) == sought)
+            .collect();
+        let used: Vec<u32> = (0u32..)
+            .zip(&in_class)
+            .filter(|&(number, &inside)| {
+                inside && model.parts.iter().any(|part| part.material == number)
+            })
+            .map(|(number, _)| number)
+            .collect();
+        if used.len() < 2 {
+            continue;
+        }
+        let folded = model.materials.len() as u32;
+        for part in &mut model.parts {
+            if !in_class.get(part.material as usize).copied().unwrap_or(false) {
+                continue;
+            }
+            let base = model.materials[part.material as usize].base_color;
+            if part.colors.is_empty() {
+                part.colors = vec![[u16::MAX; 4]; part.positions.len()];
+            }
+            for color in &mut part.colors {
+                for channel in 0..4 {
+                    let value = f32::from(color[channel]) * base[channel].clamp(0.0, 1.0);
+                    color[channel] = value.round() as u16;
+                }
+            }
+            part.material = folded;
+        }
+        model.materials.push(Material {
+            base_color: [1.0; 4],
+            alpha: if sought.0 { AlphaMode::Blend } else { AlphaMode::Opaque },
+            double_sided: sought.1,
+            ..Material::plain(format!("untextured {folded}"))
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Group, Part, Warnings};
+
+    fn model(colors: &[[f32; 4]]) -> Model {
+        let part = |material: u32| Part {
+            material,
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            indices: vec![0, 1, 2],
+            ..Default::default()
+        };
+        Model {
+            source: "m.obj".into(),
+            dependencies: Vec::new(),
+            groups: vec![Group { name: "g".into() }],
+            parts: (0..colors.len() as u32).map(part).collect(),
+            materials: colors
+                .iter()
+                .map(|&base_color| Material { base_color, ..Material::plain("m") })
+                .collect(),
+            textures: Vec::new(),
+            up: None,
+            warnings: Warnings::default(),
+        }
+    }
+
+    #[test]
+    fn colours_move_to_the_vertices() {
+        let mut folded = model(&[[1.0, 0.0, 0.5, 1.0], [0.0, 1.0, 0.0, 1.0]]);
+        merge_untextured(&mut folded);
+        assert_eq!(folded.parts[0].material, folded.parts[1].material);
+        assert_eq!(folded.materials[folded.parts[0].material as usize].base_color, [1.0; 4]);
+        assert_eq!(folded.parts[0].colors[2], [65535, 0, 32768, 65535]);
+        assert_eq!(folded.parts[1].colors[0], [0, 65535, 0, 65535]);
+    }
+
+    #[test]
+    fn a_single_untextured_material_stays() {
+        let mut single = model(&[[0.2, 0.3, 0.4, 1.0]]);
+        merge_untextured(&mut single);
+        assert_eq!((single.parts[0].material, single.materials.len()), (0, 1));
+        assert!(single.parts[0].colors.is_empty());
+    }
+}

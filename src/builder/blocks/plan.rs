@@ -1,0 +1,215 @@
+//! Dividing an input into blocks, the unit at the top of each tree.
+//!
+//! A block should have a few tens of thousands of triangles and be compact. Groups of the source
+//! are blocks where they are of that size; tiny ones are merged with their neighbours, and so are
+//! those of one surface ([`crate::builder::blocks::merge_adjacent`]); where there are no groups, or one is huge, the mesh is
+//! cut, exactly as nodes are (see [`crate::builder::cut::split`]).
+
+use crate::builder::blocks::merge_adjacent::merge_adjacent;
+use crate::mesh::{Model, UpAxis};
+
+/// How blocks are made.
+#[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BlockMode {
+    /// Groups where they make sense, merged where tiny or one surface, divided where huge or absent.
+    #[default]
+    Auto,
+    /// Every group of the source is a block.
+    Groups,
+    /// Squares of this side (metres) on the ground.
+    Grid(f64),
+}
+
+impl std::str::FromStr for BlockMode {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "groups" => Ok(Self::Groups),
+            _ => text
+                .strip_prefix("grid:")
+                .and_then(|metres| metres.trim().parse::<f64>().ok())
+                .filter(|metres| metres.is_finite() && *metres > 0.0)
+                .map(Self::Grid)
+                .ok_or_else(|| "expected auto, groups, or grid:METRES with METRES > 0".into()),
+        }
+    }
+}
+
+impl std::fmt::Display for BlockMode {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Auto => out.write_str("auto"),
+            Self::Groups => out.write_str("groups"),
+            Self::Grid(metres) => write!(out, "grid:{metres}"),
+        }
+    }
+}
+
+/// Groups below this many budgets are tiny: they are merged with tiny neighbours.
+const TINY_BUDGETS: usize = 4;
+/// Merged blocks have at most this many budgets of triangles.
+const MERGED_BUDGETS: usize = 16;
+/// A group above this many budgets is divided (the thesis's blocks have 87 on average).
+const HUGE_BUDGETS: usize = 400;
+/// A file without groups is divided above this many budgets, and so divided chunks have at most
+/// as many.
+const DIVIDED_BUDGETS: usize = 128;
+
+/// A block that shares more vertices with others than a root's budget divided by this is made one
+/// with them: all of them are there at every level.
+const WELDED: usize = 8;
+
+/// A block before its geometry is gathered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BlockPlan {
+    /// For people: the group's name, or that of the first of several.
+    pub name: String,
+    /// Indices into [`Model::parts`].
+    pub parts: Vec<usize>,
+    /// How it is divided further, if it is.
+    pub divide: Division,
+}
+
+/// How a planned block is cut into several.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Division {
+    /// It stays whole.
+    Whole,
+    /// Halved until no chunk has more triangles than this.
+    Halves {
+        /// Triangles.
+        most: usize,
+    },
+    /// Cut along the lines of a grid of this side in metres, on these two axes.
+    Grid {
+        /// Metres.
+        metres: f64,
+        /// The horizontal axes.
+        axes: [usize; 2],
+    },
+}
+
+/// Facts of a group that planning needs.
+struct GroupFacts {
+    group: usize,
+    parts: Vec<usize>,
+    triangles: usize,
+    centre: [f64; 3],
+}
+
+/// Plans the blocks of a model.
+pub fn plan(model: &Model, mode: BlockMode, desired_tris: u32, up: UpAxis) -> Vec<BlockPlan> {
+    let groups = group_facts(model);
+    let name = |group: usize| model.groups[group].name.clone();
+    let whole = |facts: &GroupFacts| BlockPlan {
+        name: name(facts.group),
+        parts: facts.parts.clone(),
+        divide: Division::Whole,
+    };
+    let budget = desired_tris as usize;
+    match mode {
+        BlockMode::Groups => groups.iter().map(whole).collect(),
+        BlockMode::Grid(metres) => {
+            let axes = match up {
+                UpAxis::Y => [0, 2],
+                UpAxis::Z => [0, 1],
+            };
+            vec![BlockPlan {
+                name: name(groups.first().map_or(0, |facts| facts.group)),
+                parts: (0..model.parts.len()).collect(),
+                divide: Division::Grid { metres, axes },
+            }]
+        }
+        BlockMode::Auto => {
+            let huge = if groups.len() == 1 { DIVIDED_BUDGETS } else { HUGE_BUDGETS } * budget;
+            let mut plans: Vec<(usize, BlockPlan)> = Vec::new();
+            let mut tiny = Vec::new();
+            for facts in groups {
+                if facts.triangles < TINY_BUDGETS * budget && model.groups.len() > 1 {
+                    tiny.push(facts);
+                } else {
+                    let mut block = whole(&facts);
+                    if facts.triangles > huge {
+                        block.divide = Division::Halves { most: DIVIDED_BUDGETS * budget };
+                    }
+                    plans.push((facts.group, block));
+                }
+            }
+            for cluster in merge_tiny(tiny, MERGED_BUDGETS * budget) {
+                let first = cluster.iter().map(|facts| facts.group).min().unwrap_or(0);
+                let mut parts: Vec<usize> =
+                    cluster.iter().flat_map(|facts| facts.parts.iter().copied()).collect();
+                parts.sort_unstable();
+                plans
+                    .push((first, BlockPlan { name: name(first), parts, divide: Division::Whole }));
+            }
+            plans.sort_by_key(|(first, _)| *first);
+            let plans = plans.into_iter().map(|(_, plan)| plan).collect();
+            merge_adjacent(model, plans, budget / WELDED, MERGED_BUDGETS * budget)
+        }
+    }
+}
+
+fn group_facts(model: &Model) -> Vec<GroupFacts> {
+    let mut parts: Vec<Vec<usize>> = vec![Vec::new(); model.groups.len()];
+    for (number, part) in model.parts.iter().enumerate() {
+        parts[part.group as usize].push(number);
+    }
+    parts
+        .into_iter()
+        .enumerate()
+        .filter(|(_, parts)| !parts.is_empty())
+        .map(|(group, parts)| {
+            let triangles = parts.iter().map(|&part| model.parts[part].indices.len() / 3).sum();
+            let mut low = [f64::INFINITY; 3];
+            let mut high = [f64::NEG_INFINITY; 3];
+            for position in parts.iter().flat_map(|&part| &model.parts[part].positions) {
+                for i in 0..3 {
+                    low[i] = low[i].min(position[i]);
+                    high[i] = high[i].max(position[i]);
+                }
+            }
+            let centre = std::array::from_fn(|i| (low[i] + high[i]) * 0.5);
+            GroupFacts { group, parts, triangles, centre }
+        })
+        .collect()
+}
+
+/// Halves the groups along the longest side of their centres, at the middle by triangles, until
+/// no cluster has more than `most` triangles.
+fn merge_tiny(groups: Vec<GroupFacts>, most: usize) -> Vec<Vec<GroupFacts>> {
+    let mut clusters = Vec::new();
+    let mut stack = vec![groups];
+    while let Some(mut groups) = stack.pop() {
+        let total: usize = groups.iter().map(|facts| facts.triangles).sum();
+        if groups.is_empty() {
+            continue;
+        }
+        if total <= most || groups.len() == 1 {
+            clusters.push(groups);
+            continue;
+        }
+        let side = |axis: usize| {
+            let of = groups.iter().map(|facts| facts.centre[axis]);
+            of.clone().fold(f64::NEG_INFINITY, f64::max) - of.fold(f64::INFINITY, f64::min)
+        };
+        let axis = (1..3).fold(0, |best, axis| if side(axis) > side(best) { axis } else { best });
+        groups
+            .sort_by(|a, b| a.centre[axis].total_cmp(&b.centre[axis]).then(a.group.cmp(&b.group)));
+        let mut sum = 0;
+        let middle = groups
+            .iter()
+            .position(|facts| {
+                sum += facts.triangles;
+                2 * sum >= total
+            })
+            .map_or(1, |at| (at + 1).clamp(1, groups.len() - 1));
+        let upper = groups.split_off(middle);
+        stack.push(upper);
+        stack.push(groups);
+    }
+    clusters
+}

@@ -1,0 +1,11 @@
+//! What a cutting plane leaves behind: a border that both sides thin alike, skirts and caps.
+
+pub mod cap;
+pub mod chain;
+mod cover;
+pub mod rank;
+pub mod shared;
+pub mod skirt;
+pub mod span;
+pub mod thin;
+pub mod vertex;

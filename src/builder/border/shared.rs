@@ -1,0 +1,119 @@
+//! Vertices that blocks made of groups have in common.
+//!
+//! Tiles of a scan and the groups of a modelled city are separate in the file but meet along
+//! borders, vertex by vertex. These borders are no cutting planes and need not be flat, so there
+//! are no skirts to cover what thinning would open: such vertices are kept at every level.
+
+use std::sync::Arc;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::builder::border::chain::CutPlane;
+use crate::builder::cut::split::Chunk;
+use crate::mesh::{PositionKey, key};
+
+/// A box of source coordinates: least and greatest corner.
+pub type Bounds = ([f64; 3], [f64; 3]);
+
+/// Finds positions that several blocks use. `blocks` are each block's bounds and positions.
+pub fn shared_positions<P>(
+    blocks: &[Bounds],
+    positions: impl Fn(usize) -> P,
+) -> FxHashSet<PositionKey<f64>>
+where
+    P: Iterator<Item = [f64; 3]>,
+{
+    let mut shared: FxHashSet<PositionKey<f64>> = FxHashSet::default();
+    each_shared(blocks, positions, |position, _, _| {
+        shared.insert(position);
+    });
+    shared
+}
+
+/// Calls `found` with each position that several blocks use, the first of them, and each other one.
+pub fn each_shared<P>(
+    blocks: &[Bounds],
+    positions: impl Fn(usize) -> P,
+    mut found: impl FnMut(PositionKey<f64>, usize, usize),
+) where
+    P: Iterator<Item = [f64; 3]>,
+{
+    let meet = |a: &Bounds, b: &Bounds| (0..3).all(|i| a.0[i] <= b.1[i] && b.0[i] <= a.1[i]);
+    let holds =
+        |bounds: &Bounds, p: &[f64; 3]| (0..3).all(|i| bounds.0[i] <= p[i] && p[i] <= bounds.1[i]);
+    // The first block that uses a position, and the last.
+    let mut users: FxHashMap<PositionKey<f64>, [u32; 2]> = FxHashMap::default();
+    for (number, bounds) in blocks.iter().enumerate() {
+        let others: Vec<&Bounds> = blocks
+            .iter()
+            .enumerate()
+            .filter(|&(other, _)| other != number)
+            .map(|(_, other)| other)
+            .filter(|other| meet(bounds, other))
+            .collect();
+        if others.is_empty() {
+            continue;
+        }
+        let block = number as u32;
+        for position in positions(number) {
+            if !others.iter().any(|other| holds(other, &position)) {
+                continue;
+            }
+            let key = key(position);
+            let [first, last] = users.entry(key).or_insert([block; 2]);
+            if *last != block {
+                *last = block;
+                found(key, *first as usize, number);
+            }
+        }
+    }
+}
+
+/// Marks the shared vertices of a block, if it has any, as lying on a border that never thins.
+pub fn keep_shared(chunk: &mut Chunk<f64>, shared: &FxHashSet<PositionKey<f64>>) {
+    if shared.is_empty() || chunk.path.len() >= 60 {
+        return;
+    }
+    let bit = 1u64 << chunk.path.len();
+    let mut any = false;
+    for (vertex, &position) in chunk.mesh.positions.iter().enumerate() {
+        if shared.contains(&key(position)) {
+            chunk.border.planes[vertex] |= bit;
+            chunk.border.keep[vertex] = 0;
+            any = true;
+        }
+    }
+    if any {
+        chunk.path = chunk.path.with(Arc::new(CutPlane::from_chains(0, f64::NAN, Vec::new())));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::border::vertex::{Border, BorderVertexState};
+    use crate::mesh::Mesh;
+
+    #[test]
+    fn only_positions_of_two_blocks_are_shared_and_they_are_kept_at_every_level() {
+        let blocks = [
+            vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
+            vec![[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 1.0, 0.5]],
+        ];
+        let bounds = [([0.0; 3], [1.0, 1.0, 0.0]), ([1.0, 0.0, 0.0], [2.0, 1.0, 0.5])];
+        let shared = shared_positions(&bounds, |block| blocks[block].iter().copied());
+        assert_eq!(shared.len(), 1);
+        assert!(shared.contains(&key([1.0, 0.0, 0.0])));
+
+        let mesh = Mesh { positions: blocks[0].clone(), ..Mesh::default() };
+        let mut chunk = Chunk { mesh, border: Border::interior(4), ..Chunk::default() };
+        keep_shared(&mut chunk, &shared);
+        let state = |vertex: usize, level| {
+            chunk.path.state(chunk.border.planes[vertex], chunk.border.keep[vertex], level)
+        };
+        assert_eq!(
+            [state(1, 0), state(1, 9), state(0, 0)],
+            [BorderVertexState::Kept, BorderVertexState::Kept, BorderVertexState::Free]
+        );
+    }
+}

@@ -1,0 +1,203 @@
+//! Where a block's nodes go: textured, written as GLB, and remembered for `scene.hlod`.
+
+use crate::builder::border::skirt;
+use crate::builder::hierarchy::{NodeDraft, NodeSink};
+use crate::builder::progress::Progress;
+use crate::builder::simplify::ladder::{BUDGET_TOLERANCE, LadderStep};
+use crate::builder::stages::{Stage, Stages};
+use crate::format::attributes::{Attributes, attributes};
+use crate::format::{
+    Encoding, NODES_DIR, NodeImageData, NodeLabel, OutputDir, file_crc, write_glb_encoded,
+};
+use crate::mesh::{Mesh, UpAxis, Warnings};
+use crate::texture::{AppendedSkirts, BakeReason, BakedMesh, BlockTextures, TexturedNode};
+use crate::{Error, Result};
+
+/// What is kept of a written node.
+#[derive(Clone, Debug)]
+pub struct NodeRecord {
+    /// Stable identity; see [`node_id`].
+    pub id: u64,
+    /// File name inside `nodes/`.
+    pub file: String,
+    /// Size of the file.
+    pub file_bytes: u64,
+    /// Checksum of the file.
+    pub file_crc: u32,
+    /// Source coordinates of the file's origin.
+    pub origin: [f64; 3],
+    /// From its geometry.
+    pub attributes: Attributes,
+    /// Bound on the distance to the source, metres; not yet monotone.
+    pub geometric_error: f64,
+    /// Mean distance to the source, metres.
+    pub mean_error: f64,
+    /// 95th percentile of it.
+    pub p95_error: f64,
+    /// Width and height of each of its own pictures, in the order of the file.
+    pub pictures: Vec<[u32; 2]>,
+    /// Texels and names of the shared pictures that it uses.
+    pub shared: Vec<(String, u64)>,
+    /// Steps from its root.
+    pub level: u32,
+    /// The triangles that it may have.
+    pub budget: usize,
+    /// How it was made; `None` where it was taken over from an earlier build.
+    pub step: Option<LadderStep>,
+    /// Why it has a texture of its own, where it has.
+    pub baked: Option<BakeReason>,
+    /// Why it has more than it may, where it has.
+    pub reason: Option<String>,
+    /// What was imperfect.
+    pub warnings: Warnings,
+}
+
+impl NodeRecord {
+    /// Texels of its own pictures.
+    pub fn own_texels(&self) -> u64 {
+        self.pictures.iter().map(|&[width, height]| u64::from(width) * u64::from(height)).sum()
+    }
+}
+
+/// Writes the nodes of one block.
+pub struct DiskSink<'a> {
+    /// Pictures of the block at every level.
+    pub textures: &'a BlockTextures<'a>,
+    /// Where files go.
+    pub out: &'a OutputDir,
+    /// Beginning of the block's file names; unique in the output.
+    pub prefix: String,
+    /// Source coordinates of the block's origin.
+    pub origin: [f64; 3],
+    /// For glTF's axes.
+    pub up: UpAxis,
+    /// How geometry is stored.
+    pub encoding: Encoding,
+    /// `c_textured`.
+    pub textured_weight: f64,
+    /// Where the time goes.
+    pub stages: &'a Stages,
+    /// Told of finished leaves.
+    pub progress: &'a dyn Progress,
+}
+
+/// The identity of a node: 48 bits of a hash of its file name, so that a rebuild of the same
+/// source gives the same ids whatever else changed. Fits in a JSON number.
+pub fn node_id(file: &str) -> u64 {
+    let hash = blake3::hash(file.as_bytes());
+    hash.as_bytes()[..6].iter().fold(0, |id, &byte| (id << 8) | u64::from(byte))
+}
+
+impl NodeSink for DiskSink<'_> {
+    type Record = NodeRecord;
+
+    fn take(&self, node: &NodeDraft) -> Result<NodeRecord> {
+        let child_path: Vec<String> = node.child_path.iter().map(u32::to_string).collect();
+        let file = if child_path.is_empty() {
+            format!("{}.glb", self.prefix)
+        } else {
+            format!("{}-{}.glb", self.prefix, child_path.join("."))
+        };
+        let id = node_id(&file);
+        let baked = node.baked.and_then(|_| {
+            self.stages.time(Stage::Bake, || self.textures.bake(node.mesh, node.resolution))
+        });
+        let textured = self.stages.time(Stage::Atlas, || match baked {
+            Some(baked) => self.baked(node, baked),
+            None => self.textured(node),
+        })?;
+        let TexturedNode { mut mesh, warnings, .. } = textured;
+        self.stages.time(Stage::Write, || {
+            let label = NodeLabel { id, level: node.level() as u32 };
+            self.encoding.prepare(&mut mesh);
+            let bytes = write_glb_encoded(&mesh, self.up, label, self.encoding)?;
+            self.out.write(format!("{NODES_DIR}/{file}"), &bytes)?;
+            let attributes = attributes(&mesh, self.textured_weight);
+            let pictures = mesh
+                .images
+                .iter()
+                .filter(|image| matches!(image.data, NodeImageData::Embedded { .. }))
+                .map(|image| [image.width, image.height])
+                .collect();
+            let shared = mesh
+                .images
+                .iter()
+                .filter_map(|image| match &image.data {
+                    NodeImageData::Shared { file_name } => {
+                        let texels = u64::from(image.width) * u64::from(image.height);
+                        Some((file_name.to_string(), texels))
+                    }
+                    NodeImageData::Embedded { .. } => None,
+                })
+                .collect();
+            Ok(NodeRecord {
+                id,
+                file,
+                file_bytes: bytes.len() as u64,
+                file_crc: file_crc(&bytes),
+                origin: mesh.origin,
+                attributes,
+                geometric_error: node.error.bound,
+                mean_error: node.error.mean,
+                p95_error: node.error.p95,
+                pictures,
+                shared,
+                level: node.level() as u32,
+                budget: node.budget,
+                step: Some(node.step),
+                baked: node.baked,
+                reason: over_budget(node, attributes.triangles as usize),
+                warnings,
+            })
+        })
+    }
+
+    fn leaves_done(&self, triangles: usize) {
+        self.progress.built(triangles as u64);
+    }
+}
+
+impl DiskSink<'_> {
+    fn baked(&self, node: &NodeDraft, mut baked: BakedMesh) -> Result<TexturedNode> {
+        let skirts = skirt::rehung(node.skirts, node.mesh, &baked.mesh);
+        let skirts = skirt::append(&mut baked.mesh, &skirts);
+        self.textures.baked_node_mesh(&baked, &skirts, node.resolution, self.origin)
+    }
+
+    fn textured(&self, node: &NodeDraft) -> Result<TexturedNode> {
+        if node.skirts.is_empty() {
+            let none = AppendedSkirts::default();
+            return self.textures.node_mesh(node.mesh, &none, node.resolution, self.origin);
+        }
+        let mut mesh: Mesh = node.mesh.clone();
+        let skirts = skirt::append(&mut mesh, node.skirts);
+        self.textures.node_mesh(&mesh, &skirts, node.resolution, self.origin)
+    }
+}
+
+/// Why a node has more triangles than it may.
+fn over_budget(node: &NodeDraft, triangles: usize) -> Option<String> {
+    if node.step == LadderStep::Original
+        || triangles as f64 <= (node.budget as f64 * BUDGET_TOLERANCE).ceil()
+    {
+        return None;
+    }
+    let skirts = skirt::triangles_of(node.skirts);
+    Some(if triangles - skirts <= node.budget {
+        format!("its long border needs {skirts} triangles of skirts")
+    } else {
+        format!("{} border vertices shared with neighbours cannot be removed", node.locked)
+    })
+}
+
+/// Two nodes with one id, which a hash of 48 bits makes unlikely.
+pub fn check_unique(ids: &mut [(u64, String)]) -> Result<()> {
+    ids.sort_unstable();
+    match ids.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        Some(pair) => Err(Error::Internal(format!(
+            "nodes {} and {} have the same id; rename one of the inputs",
+            pair[0].1, pair[1].1
+        ))),
+        None => Ok(()),
+    }
+}

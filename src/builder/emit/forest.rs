@@ -1,0 +1,85 @@
+//! From the trees of all blocks to the scene: order, links, monotone errors.
+
+use std::collections::BTreeMap;
+
+use crate::builder::emit::disk_sink::NodeRecord;
+use crate::builder::hierarchy::Tree;
+use crate::format::Node;
+
+/// Makes a parent's error no less than its children's, from the leaves up.
+pub fn make_errors_monotone(tree: &mut Tree<NodeRecord>) -> f64 {
+    let below = tree.children.iter_mut().map(make_errors_monotone).fold(0.0, f64::max);
+    tree.record.geometric_error = tree.record.geometric_error.max(below);
+    tree.record.geometric_error
+}
+
+/// Appends the nodes of a block's tree, breadth first, with their links.
+pub fn append_nodes(
+    nodes: &mut Vec<Node>,
+    tree: Tree<NodeRecord>,
+    block: u32,
+    shared_numbers: &BTreeMap<String, u32>,
+) {
+    let mut level = vec![(None, vec![tree])];
+    while !level.is_empty() {
+        let mut next = Vec::new();
+        for (parent, siblings) in level {
+            let count = siblings.len();
+            for (place, Tree { record, children }) in siblings.into_iter().enumerate() {
+                let index = nodes.len() as u32;
+                if place == 0
+                    && let Some(parent) = parent
+                {
+                    let parent: &mut Node = &mut nodes[parent as usize];
+                    parent.first_child = Some(index);
+                }
+                let next_sibling = (place + 1 < count).then_some(index + 1);
+                nodes.push(node_of(record, parent, next_sibling, block, shared_numbers));
+                if !children.is_empty() {
+                    next.push((Some(index), children));
+                }
+            }
+        }
+        level = next;
+    }
+}
+
+fn node_of(
+    record: NodeRecord,
+    parent: Option<u32>,
+    next_sibling: Option<u32>,
+    block: u32,
+    shared_numbers: &BTreeMap<String, u32>,
+) -> Node {
+    let mut shared_textures: Vec<u32> =
+        record.shared.iter().filter_map(|(name, _)| shared_numbers.get(name).copied()).collect();
+    shared_textures.sort_unstable();
+    shared_textures.dedup();
+    Node {
+        id: record.id,
+        parent,
+        first_child: None,
+        next_sibling,
+        level: record.level,
+        block: Some(block),
+        triangles: record.attributes.triangles,
+        textured_triangles: record.attributes.textured_triangles,
+        vertices: record.attributes.vertices,
+        bbox_min: record.attributes.bbox_min,
+        bbox_max: record.attributes.bbox_max,
+        cost: record.attributes.cost,
+        static_benefit: record.attributes.static_benefit,
+        average_normal: record.attributes.average_normal.map(|c| c as f32),
+        geometric_error: record.geometric_error,
+        mean_error: record.mean_error,
+        p95_error: record.p95_error,
+        texels: record.own_texels(),
+        shared_texels: record.shared.iter().map(|(_, texels)| texels).sum(),
+        origin: record.origin,
+        file: record.file,
+        file_bytes: record.file_bytes,
+        file_crc: record.file_crc,
+        shared_textures,
+        pictures: record.pictures,
+    }
+}

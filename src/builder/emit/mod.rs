@@ -1,0 +1,4 @@
+//! Nodes as files.
+
+pub mod disk_sink;
+pub mod forest;

@@ -1,0 +1,348 @@
+//! The largest distance from one surface to another, one way, by branch and bound.
+//!
+//! Only the largest distance counts, so that of most parts of the surface it is enough to know
+//! that they are not farther than a point that was found elsewhere. A part is settled
+//! - where its centre is nearer than that by more than the part reaches from there;
+//! - where all its corners are near one triangle of the other surface: the distance to that is
+//!   convex, so that nothing between them is farther.
+//!
+//! What is not settled is divided: nodes of the hierarchy into their children, leaves into
+//! triangles, triangles into polygons. A polygon is clipped to what is near one triangle, which
+//! is settled, and what is left around, so that equal surfaces with other triangles take about as
+//! many polygons as their triangles overlap in.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use glam::{DVec3, Vec3};
+
+use super::bvh::{Box3, LEAF};
+use super::original::{Original, Search, TriangleId};
+use super::polygon::{Clipped, Polygon, bisect, centroid, clip};
+use super::triangle::{LANES, Points, Triangle, max};
+
+/// The bound is at most so many times the largest distance found, as far as the budget goes.
+pub const TIGHTNESS: f32 = 1.1;
+
+/// Polygons that one triangle is divided into at once. What is then left waits until that of all
+/// other triangles is known, and is taken up with the largest bound first.
+const POLYGONS_PER_TRIANGLE: usize = 256;
+
+/// Polygons that wait are divided so many times in all, or so many times for each triangle of
+/// both surfaces.
+const BUDGET: usize = 4096;
+const BUDGET_PER_TRIANGLE: usize = 4;
+
+/// A polygon with more corners is bisected: clipping may add some.
+const MOST_CORNERS: usize = 24;
+
+/// A polygon this many times as large as the region that it would be clipped to is bisected.
+const MUCH_LARGER: f64 = 16.0;
+
+/// A triangle not farther from a polygon's centre than this share of the largest distance will do
+/// as the nearest.
+const NEAR_ENOUGH: f32 = 0.5;
+
+/// Leaves whose first triangles are measured before all others.
+const SEEDS: usize = 64;
+
+/// The largest distance of both ways, as far as it is known.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Largest {
+    /// Found at a point.
+    pub found: f32,
+    /// No part that is settled is farther.
+    pub settled: f32,
+    /// Whether the budget was too small.
+    pub exhausted: bool,
+    /// Polygons that were divided.
+    pub divisions: usize,
+}
+
+impl Largest {
+    /// Nothing less than `least` is told apart.
+    pub fn at_least(least: f32) -> Self {
+        Self { found: least, settled: 0.0, exhausted: false, divisions: 0 }
+    }
+
+    /// No point of either surface is farther.
+    pub fn bound(&self) -> f32 {
+        self.found.max(self.settled)
+    }
+
+    fn limit(&self) -> f32 {
+        self.found * TIGHTNESS
+    }
+
+    /// Whether what is not farther than this needs no division.
+    fn settles(&mut self, bound: f32) -> bool {
+        let settles = bound <= self.limit();
+        if settles {
+            self.settled = self.settled.max(bound);
+        }
+        settles
+    }
+}
+
+/// Part of a triangle.
+struct Part {
+    corners: Polygon,
+    /// No point of it is farther.
+    bound: f32,
+    /// How far its centre is, and from which triangle, where that is known.
+    near: Option<(f32, TriangleId)>,
+}
+
+impl Part {
+    fn new(corners: Polygon, bound: f32) -> Self {
+        Self { corners, bound, near: None }
+    }
+}
+
+/// From a surface to another; neither may be empty.
+pub(super) struct Directed<'a> {
+    from: &'a Original,
+    search: Search<'a>,
+    largest: Largest,
+    budget: usize,
+}
+
+/// Measures some points, spread evenly.
+pub(super) fn seed(from: &Original, to: &Original, largest: &mut Largest) {
+    let mut search = Search::new(to);
+    let leaves: usize = from.parts.iter().map(|part| part.bvh.leaves.len()).sum();
+    let leaves_of = |part: usize| from.parts[part].bvh.leaves.iter();
+    let all = (0..from.parts.len()).flat_map(leaves_of);
+    for leaf in all.step_by(leaves.div_ceil(SEEDS)) {
+        for point in leaf.lane(0).corners() {
+            let near = search.nearest(point, largest.found);
+            largest.found = largest.found.max(near.squared.sqrt());
+        }
+    }
+}
+
+impl<'a> Directed<'a> {
+    pub fn new(from: &'a Original, to: &'a Original, largest: Largest) -> Self {
+        let triangles = from.triangle_count() + to.triangle_count();
+        let budget = BUDGET.max(BUDGET_PER_TRIANGLE * triangles);
+        Self { from, search: Search::new(to), largest, budget }
+    }
+
+    /// Raises the largest distance to what it is, or to what the budget can say.
+    pub fn run(mut self) -> Largest {
+        let mut open = Vec::new();
+        for (number, part) in (0..).zip(&self.from.parts) {
+            self.child(number, part.bvh.tree.root, part.bvh.bounds, &mut open);
+        }
+        let mut left = BinaryHeap::new();
+        for part in open {
+            self.divide(part, &mut left);
+        }
+        self.divide_rest(left);
+        self.largest
+    }
+
+    /// Measures a point of the surface, to no less than `enough` or the largest so far.
+    fn measure(&mut self, point: Vec3, enough: f32) -> (f32, TriangleId) {
+        let near = self.search.nearest(point, enough.min(self.largest.found));
+        let distance = near.squared.sqrt();
+        self.largest.found = self.largest.found.max(distance);
+        (distance, near.id)
+    }
+
+    /// Measures the centre of a part that reaches so far from there, to no less than what settles
+    /// it or what makes a triangle worth clipping to.
+    fn measure_near(&mut self, centre: Vec3, reach: f32) -> (f32, TriangleId) {
+        let settling = self.largest.limit() - reach;
+        self.measure(centre, settling.max(self.largest.found * NEAR_ENOUGH))
+    }
+
+    fn child(&mut self, part: u32, child: u32, bounds: Box3, open: &mut Vec<Part>) {
+        let reach = bounds.diagonal() * 0.5;
+        let limit = self.largest.limit();
+        // Otherwise not even a centre on the other surface would do.
+        if reach < limit {
+            let near = self.search.nearest(bounds.centre(), limit - reach);
+            if self.largest.settles(near.squared.sqrt() + reach) {
+                return;
+            }
+        }
+        if child & LEAF != 0 {
+            return self.leaf(part, child & !LEAF, open);
+        }
+        let from = self.from;
+        for (child, bounds) in from.parts[part as usize].bvh.tree.nodes[child as usize].boxes() {
+            self.child(part, child, bounds, open);
+        }
+    }
+
+    /// Settles triangles of a leaf, all at a time, by triangles of the other surface that one of
+    /// them is near to.
+    fn leaf(&mut self, part: u32, leaf: u32, open: &mut Vec<Part>) {
+        let bvh = &self.from.parts[part as usize].bvh;
+        let corners = bvh.leaves[leaf as usize].corners();
+        let mut bounds = [f32::INFINITY; LANES];
+        let mut unsettled = (1u32 << bvh.counts[leaf as usize]) - 1;
+        while unsettled != 0 {
+            let chosen = unsettled.trailing_zeros() as usize;
+            let [a, b, c] = [0, 1, 2].map(|corner| corners[corner].lane(chosen));
+            let centre = (a + b + c) / 3.0;
+            let reach = [a, b, c].map(|corner| corner.distance_squared(centre));
+            let reach = reach.into_iter().fold(0f32, f32::max).sqrt();
+            let (distance, near) = self.measure_near(centre, reach);
+            bounds[chosen] = bounds[chosen].min(distance + reach);
+            let triangle = self.search.original().triangle(near);
+            let squared = [0, 1, 2].map(|corner| triangle.squared_distances(&corners[corner]));
+            let [a, b, c] = squared;
+            let tried = unsettled;
+            for lane in (0..LANES).filter(|lane| tried >> lane & 1 == 1) {
+                bounds[lane] = bounds[lane].min(max(max(a[lane], b[lane]), c[lane]).sqrt());
+                if self.largest.settles(bounds[lane]) {
+                    unsettled &= !(1 << lane);
+                }
+            }
+            // The one that the triangle was found for needs more than that.
+            if unsettled >> chosen & 1 == 0 {
+                continue;
+            }
+            unsettled &= !(1 << chosen);
+            for (corners, squared) in corners.iter().zip(squared) {
+                // Others are known to be nearer than what was found.
+                if squared[chosen] > self.largest.found.powi(2) {
+                    self.measure(corners.lane(chosen), self.largest.found);
+                }
+            }
+            let bound = bounds[chosen];
+            if !self.largest.settles(bound) {
+                let corners = corners.map(|corners| corners.lane(chosen).as_dvec3()).to_vec();
+                open.push(Part { corners, bound, near: Some((distance, near)) });
+            }
+        }
+    }
+
+    /// Divides a triangle and what it is divided into, to some number of polygons.
+    fn divide(&mut self, part: Part, left: &mut BinaryHeap<Waiting>) {
+        let mut stack = vec![part];
+        let mut divisions = 0;
+        while let Some(part) = stack.pop() {
+            if self.largest.settles(part.bound) {
+                continue;
+            }
+            if divisions == POLYGONS_PER_TRIANGLE {
+                left.push(Waiting { number: left.len(), part });
+                continue;
+            }
+            divisions += 1;
+            self.divide_once(part, &mut stack);
+        }
+    }
+
+    fn divide_rest(&mut self, mut left: BinaryHeap<Waiting>) {
+        let mut number = left.len();
+        let mut divisions = 0;
+        let mut parts = Vec::new();
+        while let Some(Waiting { part, .. }) = left.pop() {
+            // All others are nearer.
+            if self.largest.settles(part.bound) {
+                return;
+            }
+            if divisions == self.budget {
+                self.largest.exhausted = true;
+                self.largest.settled = self.largest.settled.max(part.bound);
+                return;
+            }
+            divisions += 1;
+            self.divide_once(part, &mut parts);
+            for part in parts.drain(..) {
+                left.push(Waiting { number, part });
+                number += 1;
+            }
+        }
+    }
+
+    fn divide_once(&mut self, part: Part, parts: &mut Vec<Part>) {
+        self.largest.divisions += 1;
+        let Part { corners, bound, near } = part;
+        let centre = centroid(&corners);
+        let reach = corners.iter().map(|corner| corner.distance_squared(centre));
+        let reach = reach.fold(0.0, f64::max).sqrt();
+        let (distance, near) =
+            near.unwrap_or_else(|| self.measure_near(centre.as_vec3(), reach as f32));
+        let bound = bound.min(distance + reach as f32);
+        if self.largest.settles(bound) {
+            return;
+        }
+        let triangle = self.search.original().triangle(near);
+        let (farthest, number) = farthest_corner(&triangle, &corners);
+        let bound = bound.min(farthest);
+        if self.largest.settles(bound) {
+            return;
+        }
+        let limit = self.largest.limit();
+        let much_larger = reach > MUCH_LARGER * f64::from(triangle.length + 2.0 * limit);
+        if corners.len() <= MOST_CORNERS && !much_larger {
+            let clipped = clip(&corners, centre, reach, &triangle, limit.into());
+            if let Some(Clipped { inside, outside }) = clipped {
+                let (farthest, _) = farthest_corner(&triangle, &inside);
+                if self.largest.settles(farthest) {
+                    parts.extend(outside.into_iter().map(|corners| Part::new(corners, bound)));
+                    return;
+                }
+            }
+        }
+        self.measure(corners[number].as_vec3(), self.largest.found);
+        if self.largest.settles(bound) {
+            return;
+        }
+        let halves = bisect(corners, centre, reach);
+        parts.extend(
+            halves
+                .into_iter()
+                .filter(|half| !half.is_empty())
+                .map(|corners| Part::new(corners, bound)),
+        );
+    }
+}
+
+/// The corner that is farthest from a triangle, and how far it is.
+fn farthest_corner(triangle: &Triangle, corners: &[DVec3]) -> (f32, usize) {
+    let mut farthest = (0f32, 0);
+    for (chunk, first) in corners.chunks(LANES).zip((0..).step_by(LANES)) {
+        let points = Points::from_fn(|lane| chunk[lane.min(chunk.len() - 1)].as_vec3());
+        let squared = triangle.squared_distances(&points);
+        for (lane, &squared) in squared.iter().enumerate().take(chunk.len()) {
+            if squared > farthest.0 {
+                farthest = (squared, first + lane);
+            }
+        }
+    }
+    (farthest.0.sqrt(), farthest.1)
+}
+
+/// A part that waits for its turn: the one with the largest bound is the first, and of equal ones
+/// the oldest.
+struct Waiting {
+    part: Part,
+    number: usize,
+}
+
+impl Ord for Waiting {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let by_bound = self.part.bound.total_cmp(&other.part.bound);
+        by_bound.then_with(|| other.number.cmp(&self.number))
+    }
+}
+
+impl PartialOrd for Waiting {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Waiting {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Waiting {}

@@ -1,0 +1,79 @@
+//! The mean distance between a mesh and several others, to choose among them.
+
+use glam::Vec3;
+
+use super::original::{Original, Search};
+use crate::mesh::Mesh;
+
+/// A mesh that others are compared with.
+pub struct MeanDistance<'a> {
+    mesh: &'a Mesh,
+    /// What others are measured to, and from where; made when first needed.
+    surface: Option<(Original, Vec<Vec3>)>,
+}
+
+impl<'a> MeanDistance<'a> {
+    /// Of distances from this mesh.
+    pub fn from(mesh: &'a Mesh) -> Self {
+        Self { mesh, surface: None }
+    }
+
+    /// The mean distance from each of the two meshes to the other, added up, metres; infinite
+    /// where one has no surface. Unlike the largest distance it tells a mesh that lost a lamp post
+    /// from one that is bent all over. Once it is clear that it exceeds `limit`, some number above
+    /// that.
+    pub fn to(&mut self, other: &Mesh, limit: f64) -> f64 {
+        let surface = |mesh: &Mesh| {
+            let surface = Original::of(mesh);
+            let points = surface.samples();
+            (surface, points)
+        };
+        let (from, from_points) = self.surface.get_or_insert_with(|| surface(self.mesh));
+        let (to, to_points) = surface(other);
+        if from_points.is_empty() || to_points.is_empty() {
+            return f64::INFINITY;
+        }
+        let there = mean(from_points, &to, limit);
+        if there > limit {
+            return there;
+        }
+        there + mean(&to_points, from, limit - there)
+    }
+}
+
+fn mean(points: &[Vec3], surface: &Original, limit: f64) -> f64 {
+    let mut search = Search::new(surface);
+    let count = points.len() as f64;
+    let mut sum = 0.0;
+    for &point in points {
+        sum += f64::from(search.nearest(point, 0.0).squared).sqrt();
+        if sum > limit * count {
+            break;
+        }
+    }
+    sum / count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::mesh;
+    use super::*;
+
+    #[test]
+    fn means_are_those_of_both_directions() {
+        let square = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0], [0.0, 4.0, 0.0]];
+        let flat = mesh(&square, &[[0, 1, 2], [0, 2, 3]]);
+        let lifted = mesh(&square.map(|[x, y, _]| [x, y, 0.5]), &[[0, 1, 2], [0, 2, 3]]);
+        let mut from = MeanDistance::from(&flat);
+        assert!(from.to(&flat, f64::INFINITY) < 1e-6);
+        let apart = from.to(&lifted, f64::INFINITY);
+        assert!((apart - 1.0).abs() < 1e-6, "{apart}");
+        assert!(from.to(&lifted, 0.3) > 0.3);
+        // Half of it is there: what is missing is 0 to 4 / √2 away, 4 / (3 √2) on average.
+        let half = mesh(&square, &[[0, 1, 2]]);
+        let apart = from.to(&half, f64::INFINITY);
+        let expected = 0.5 * 4.0 / (3.0 * 2f64.sqrt());
+        assert!((apart / expected - 1.0).abs() < 0.02, "{apart} {expected}");
+        assert_eq!(from.to(&Mesh::default(), f64::INFINITY), f64::INFINITY);
+    }
+}

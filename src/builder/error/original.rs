@@ -1,0 +1,204 @@
+//! The surface that a chunk had before simplification.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::bvh::{Box3, Bvh, LEAF, Node, Tree};
+use super::samples::Samples;
+use super::triangle::{LANES, Triangle, min};
+use crate::mesh::Mesh;
+
+/// The original surface of a chunk, searchable; built once and shared by all levels above it.
+/// Cheap to clone.
+#[derive(Clone, Debug)]
+pub struct Original {
+    pub(super) parts: Vec<Arc<Part>>,
+    /// Over the boxes of the parts, one to a leaf.
+    top: Arc<Tree>,
+    /// The part of each leaf.
+    numbers: Vec<u32>,
+    pub(super) bounds: Box3,
+    /// The longest edge.
+    pub(super) longest: f32,
+}
+
+/// One mesh.
+#[derive(Debug)]
+pub(super) struct Part {
+    pub bvh: Bvh,
+    pub samples: Samples,
+}
+
+/// A triangle of an [`Original`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct TriangleId {
+    pub part: u32,
+    pub leaf: u32,
+    pub lane: u32,
+}
+
+impl Original {
+    /// The surface of one mesh.
+    pub fn of(mesh: &Mesh) -> Self {
+        if mesh.triangles.is_empty() {
+            return Self::from_parts(Vec::new());
+        }
+        let bvh = Bvh::new(mesh);
+        let samples = Samples::of(&bvh);
+        Self::from_parts(vec![Arc::new(Part { bvh, samples })])
+    }
+
+    /// Several surfaces as one. Their triangles are shared, not copied.
+    pub fn union(parts: Vec<Arc<Self>>) -> Self {
+        Self::from_parts(parts.iter().flat_map(|part| part.parts.iter().cloned()).collect())
+    }
+
+    fn from_parts(parts: Vec<Arc<Part>>) -> Self {
+        let boxes: Vec<Box3> = parts.iter().map(|part| part.bvh.bounds).collect();
+        let (top, leaves) = Tree::new(&boxes, 1);
+        Self {
+            top: Arc::new(top),
+            numbers: leaves.into_iter().flatten().collect(),
+            bounds: boxes.into_iter().fold(Box3::EMPTY, Box3::and),
+            longest: parts.iter().map(|part| part.bvh.longest).fold(0.0, f32::max),
+            parts,
+        }
+    }
+
+    /// Whether there is no triangle.
+    pub fn is_empty(&self) -> bool {
+        self.parts.is_empty()
+    }
+
+    /// Of the bounding box; 0 where there is no triangle.
+    pub(super) fn diagonal(&self) -> f64 {
+        if self.is_empty() { 0.0 } else { self.bounds.diagonal().into() }
+    }
+
+    /// How many triangles there are.
+    pub fn triangle_count(&self) -> usize {
+        let of_part =
+            |part: &Arc<Part>| part.bvh.counts.iter().map(|&n| usize::from(n)).sum::<usize>();
+        self.parts.iter().map(of_part).sum()
+    }
+
+    pub(super) fn triangle(&self, id: TriangleId) -> Triangle {
+        self.parts[id.part as usize].bvh.leaves[id.leaf as usize].lane(id.lane as usize)
+    }
+}
+
+/// A triangle near a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Near {
+    pub squared: f32,
+    pub id: TriangleId,
+}
+
+/// Asks an [`Original`], which must not be empty, for what is near points.
+pub(super) struct Search<'a> {
+    original: &'a Original,
+    stack: Vec<(f32, u32, u32)>,
+    /// What was near the point before is often near the next one.
+    last: TriangleId,
+}
+
+/// In place of a part's number: the tree over the parts.
+const TOP: u32 = u32::MAX;
+
+impl<'a> Search<'a> {
+    pub fn new(original: &'a Original) -> Self {
+        let last = TriangleId { part: 0, leaf: 0, lane: 0 };
+        Self { original, stack: Vec::with_capacity(128), last }
+    }
+
+    pub fn original(&self) -> &'a Original {
+        self.original
+    }
+
+    /// The nearest triangle, or one that is not farther than `enough`.
+    pub fn nearest(&mut self, point: Vec3, enough: f32) -> Near {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has what the function is compiled for.
+            return unsafe { self.nearest_avx2(point, enough) };
+        }
+        self.nearest_portable(point, enough)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn nearest_avx2(&mut self, point: Vec3, enough: f32) -> Near {
+        self.nearest_portable(point, enough)
+    }
+
+    #[inline(always)]
+    fn nearest_portable(&mut self, point: Vec3, enough: f32) -> Near {
+        let enough = if enough > 0.0 { enough * enough } else { 0.0 };
+        let at = point;
+        let mut best = Near { squared: f32::INFINITY, id: self.last };
+        let first = self.last;
+        self.leaf(first.part, first.leaf, at, &mut best);
+        let Original { parts, top, numbers, .. } = self.original;
+        if best.squared > enough {
+            self.stack.clear();
+            let start = match &parts[..] {
+                [part] => (0.0, 0, part.bvh.tree.root),
+                _ => (0.0, TOP, top.root),
+            };
+            self.stack.push(start);
+            while let Some((squared, part, child)) = self.stack.pop() {
+                if squared >= best.squared {
+                    continue;
+                }
+                if child & LEAF == 0 {
+                    let tree = if part == TOP { top } else { &parts[part as usize].bvh.tree };
+                    push(&mut self.stack, &tree.nodes[child as usize], part, at, best.squared);
+                } else if part == TOP {
+                    let part = numbers[(child & !LEAF) as usize];
+                    self.stack.push((squared, part, parts[part as usize].bvh.tree.root));
+                } else if (part, child & !LEAF) != (first.part, first.leaf) {
+                    self.leaf(part, child & !LEAF, at, &mut best);
+                    if best.squared <= enough {
+                        break;
+                    }
+                }
+            }
+        }
+        self.last = best.id;
+        best
+    }
+
+    #[inline(always)]
+    fn leaf(&self, part: u32, leaf: u32, at: Vec3, best: &mut Near) {
+        let triangles = &self.original.parts[part as usize].bvh.leaves[leaf as usize];
+        let squared = triangles.squared_distances(at);
+        let least = squared.into_iter().fold(f32::INFINITY, min);
+        if least < best.squared {
+            let lane = squared.iter().position(|&squared| squared == least).unwrap_or(0) as u32;
+            *best = Near { squared: least, id: TriangleId { part, leaf, lane } };
+        }
+    }
+}
+
+/// Pushes the children that are nearer than `most`, the nearest last.
+#[inline(always)]
+fn push(stack: &mut Vec<(f32, u32, u32)>, node: &Node, part: u32, at: Vec3, most: f32) {
+    let squared = node.squared_distances(at);
+    // Without a branch for each, of which half would be foretold wrongly.
+    let mut near = [0; LANES];
+    let mut count = 0;
+    for (lane, &squared) in squared.iter().enumerate() {
+        near[count % LANES] = lane;
+        count += usize::from(squared < most);
+    }
+    let first = stack.len();
+    for &lane in &near[..count] {
+        let mut place = stack.len();
+        stack.push((squared[lane], part, node.children[lane]));
+        while place > first && stack[place - 1].0 < stack[place].0 {
+            stack.swap(place - 1, place);
+            place -= 1;
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! Making a coarse node: simplification, border, distance from the original.
+
+use std::sync::Arc;
+
+use super::BlockBuilder;
+use super::node::{NodeDraft, NodeSink};
+use crate::Result;
+use crate::builder::border::cap::cap_sections;
+use crate::builder::border::skirt::{CLOSED_STEPS, Skirt, skirts, triangles_of};
+use crate::builder::border::span::{BorderSpan, join_spans};
+use crate::builder::border::thin::thin_border;
+use crate::builder::border::vertex::{Border, Path};
+use crate::builder::error::{Original, SurfaceError, surface_error};
+use crate::builder::simplify::compact::compact;
+use crate::builder::simplify::fallback::fallback_triangles;
+use crate::builder::simplify::ladder::{
+    AppearanceWeights, LadderStep, Method, Simplified, simplify,
+};
+use crate::builder::simplify::weld_seams::weld_seams;
+use crate::builder::stages::Stage;
+use crate::mesh::{Mesh, all_differ};
+use crate::texture::BakeReason;
+
+/// Where simplification leaves nothing, so many of the largest triangles stay: a chunk must not
+/// vanish.
+const FALLBACK_TRIANGLES: usize = 8;
+
+/// A node's geometry as its parent needs it.
+pub(super) struct NodeSurface {
+    pub mesh: Mesh,
+    pub border: Border,
+    /// The spans of its border, if skirts are to cover them.
+    pub spans: Vec<BorderSpan>,
+    /// What it stands for.
+    pub original: Arc<Original>,
+    /// How far rounding has moved the original off the source, metres at most.
+    pub moved: f64,
+    /// Of the worst of the nodes below, which this one may not fall below.
+    pub error: SurfaceError,
+    /// A texture of its own stands for its texture coordinates.
+    pub baked: bool,
+}
+
+/// Which node is to be made.
+#[derive(Clone, Copy)]
+pub(super) struct CoarseNode<'a> {
+    pub path: &'a Path,
+    pub resolution: usize,
+    pub child_path: &'a [u32],
+    pub budget: usize,
+}
+
+/// A simplified mesh with its border.
+struct Coarse {
+    simplified: Simplified,
+    spans: Vec<BorderSpan>,
+    skirts: Vec<Skirt>,
+}
+
+impl<S: NodeSink> BlockBuilder<'_, S> {
+    /// Simplifies and writes a node that is not a leaf.
+    pub(super) fn coarse_node(
+        &self,
+        source: NodeSurface,
+        node: CoarseNode,
+    ) -> Result<(S::Record, NodeSurface)> {
+        let NodeSurface { mesh, border, spans, original, moved, error: below, baked } = source;
+        let (coarse, reason) = self
+            .stages
+            .time(Stage::Simplify, || self.simplify_or_bake(mesh, border, spans, baked, &node));
+        let Coarse { simplified: Simplified { mesh, border, step, .. }, spans, skirts } = coarse;
+        let measured =
+            self.stages.time(Stage::Measure, || surface_error(&original, &mesh)).plus(moved);
+        let error = measured.at_least(&below);
+        let on_border = |&&planes: &&u64| planes & node.path.bits() != 0;
+        let record = self.sink.take(&NodeDraft {
+            mesh: &mesh,
+            skirts: &skirts,
+            resolution: node.resolution,
+            child_path: node.child_path,
+            budget: node.budget,
+            error,
+            step,
+            baked: reason,
+            locked: border.planes.iter().filter(on_border).count(),
+        })?;
+        let baked = reason.is_some();
+        Ok((record, NodeSurface { mesh, border, spans, original, moved, error, baked }))
+    }
+
+    /// Simplifies within texture seams where these leave enough, else without them: the node then
+    /// needs a texture of its own, for the reason that is returned.
+    fn simplify_or_bake(
+        &self,
+        mut mesh: Mesh,
+        mut border: Border,
+        spans: Vec<BorderSpan>,
+        baked_below: bool,
+        node: &CoarseNode,
+    ) -> (Coarse, Option<BakeReason>) {
+        let Some(plan) = self.bake else {
+            return (self.simplified(&mesh, border, spans, node, false), None);
+        };
+        let mut reason = plan.always.or(baked_below.then_some(BakeReason::Below));
+        if reason.is_none() {
+            let coarse = self.simplified(&mesh, border.clone(), spans.clone(), node, false);
+            if coarse.simplified.step == LadderStep::Collapse {
+                return (coarse, None);
+            }
+            reason = Some(BakeReason::Seams);
+        }
+        (mesh, border) = weld_seams(&mesh, &border, plan.classes);
+        (self.simplified(&mesh, border, spans, node, true), reason)
+    }
+
+    /// The ladder's result with its border thinned, its sections capped and its skirts.
+    fn simplified(
+        &self,
+        source: &Mesh,
+        mut border: Border,
+        spans: Vec<BorderSpan>,
+        node: &CoarseNode,
+        keep_folds: bool,
+    ) -> Coarse {
+        let &CoarseNode { path, resolution, budget, .. } = node;
+        // Skirts have a margin of two steps; one is enough where corners are rounded to the nearest.
+        let skirt_step = self.lattice.step * if self.quantization.is_some() { 0.5 } else { 1.0 };
+        // A coarse lattice shows: what is open by a step of it is open.
+        let closed =
+            if self.quantization.is_some() { 0.0 } else { CLOSED_STEPS * self.lattice.step };
+        let at = resolution as u8;
+        let mut mesh = source.clone();
+        thin_border(&mut mesh, &mut border, path, at);
+        // Skirts count towards the budget, but may not take more than half of it.
+        let spans = join_spans(spans, path, at, &mesh, &border);
+        let skirt_triangles =
+            triangles_of(&skirts(&mesh, &border, &spans, path, skirt_step, closed));
+        let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
+        let weights = AppearanceWeights { keep_folds, ..self.options.weights };
+        let method = Method {
+            simplifier: self.options.simplifier,
+            weights,
+            up: self.up,
+            reorientable: self.reorientable,
+        };
+        let mut result = simplify(&mesh, &border, path, at, target, &method);
+        if self.quantization.is_some() {
+            result = self.snapped(result);
+        }
+        if result.mesh.triangles.is_empty() {
+            result = fallback_triangles(source, &border, FALLBACK_TRIANGLES.min(target));
+        }
+        cap_sections(&mut result, &spans, path, &mesh, &border);
+        let mut skirts = skirts(&result.mesh, &result.border, &spans, path, skirt_step, closed);
+        if self.quantization.is_some() {
+            for (position, _) in skirts.iter_mut().flat_map(|skirt| &mut skirt.corners) {
+                *position = self.lattice.nearest(*position);
+            }
+        }
+        Coarse { simplified: result, spans, skirts }
+    }
+
+    /// A simplified mesh with all its vertices on the lattice. Those on borders are there already;
+    /// triangles of which two corners meet are left out.
+    fn snapped(&self, simplified: Simplified) -> Simplified {
+        let Simplified { mut mesh, border, error, step } = simplified;
+        mesh.positions.iter_mut().for_each(|position| *position = self.lattice.nearest(*position));
+        let positions = &mesh.positions;
+        mesh.triangles.retain(|t| all_differ(t.map(|vertex| positions[vertex as usize])));
+        let (mesh, border) = compact(&mesh, &border);
+        Simplified { mesh, border, error, step }
+    }
+}

@@ -1,0 +1,197 @@
+//! The tree of one block (thesis section 3.2): divide, simplify, recurse.
+//!
+//! How deep it is and what each node may have is in [`shape`], where it is cut in `divide`. A
+//! node whose children are all leaves is simplified from the original while these are made (Cozzi
+//! & Loo, section 5.3), any other from its children's results. Work is parallel over children.
+
+mod coarse;
+mod divide;
+pub mod node;
+pub mod options;
+pub mod shape;
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+pub use self::node::{NodeDraft, NodeSink, Tree};
+pub use self::options::{BorderMode, HierarchyOptions, SimplifyFrom, TreeShape};
+pub use self::shape::Resolutions;
+
+use self::coarse::{CoarseNode, NodeSurface};
+use self::shape::NodePlan;
+use crate::Result;
+use crate::builder::border::span::original_spans;
+use crate::builder::border::vertex::Border;
+use crate::builder::cut::split::Chunk;
+use crate::builder::error::{Original, SurfaceError};
+use crate::builder::simplify::ladder::LadderStep;
+use crate::builder::simplify::merge::merge;
+use crate::builder::stages::{Stage, Stages};
+use crate::lattice::{Lattice, Quantization};
+use crate::mesh::{Mesh, UpAxis};
+use crate::texture::BakePlan;
+
+/// Chunks with more than this many times the desired triangles are divided and built in parallel.
+const PARALLEL: usize = 4;
+
+/// One block being built.
+pub struct BlockBuilder<'a, S> {
+    /// How.
+    pub options: &'a HierarchyOptions,
+    /// Its steps of simplification.
+    pub resolutions: Resolutions,
+    /// The seams that coarse nodes may ignore, where there are some in the way.
+    pub bake: Option<BakePlan<'a>>,
+    /// The block's lattice.
+    pub lattice: Lattice,
+    /// Where all vertices are rounded to a lattice that shows.
+    pub quantization: Option<Quantization>,
+    /// Which axis points at the sky.
+    pub up: UpAxis,
+    /// Of each material, whether its faces may be reoriented ([`crate::builder::simplify::orient`]).
+    pub reorientable: &'a [bool],
+    /// Where nodes go.
+    pub sink: &'a S,
+    /// Where the time goes.
+    pub stages: &'a Stages,
+}
+
+/// A subtree, and what its parent is simplified from.
+struct Built<R> {
+    tree: Tree<R>,
+    /// `None` below a node that is simplified from the original.
+    surface: Option<NodeSurface>,
+}
+
+impl<S: NodeSink> BlockBuilder<'_, S> {
+    /// Builds the whole tree over a block.
+    pub fn build(&self, block: Chunk) -> Result<Tree<S::Record>> {
+        let plan = self.resolutions.root(block.mesh.triangles.len());
+        Ok(self.subtree(block, plan, &[], false)?.tree)
+    }
+
+    /// How far rounding has moved a chunk off the source, metres at most, where that shows.
+    fn moved(&self, chunk: &Chunk) -> f64 {
+        self.quantization.map_or(0.0, |lattice| lattice.bound() + chunk.most_moved())
+    }
+
+    /// Builds what becomes of a chunk; `wanted` where its parent is simplified from it.
+    fn subtree(
+        &self,
+        chunk: Chunk,
+        plan: NodePlan,
+        child_path: &[u32],
+        wanted: bool,
+    ) -> Result<Built<S::Record>> {
+        let NodePlan::Coarse { resolution, budget } = plan else {
+            return self.leaf(chunk, child_path, wanted);
+        };
+        let path = chunk.path.clone();
+        let node = CoarseNode { path: &path, resolution, child_path, budget };
+        let mesh = chunk.mesh.clone();
+        let (border, moved) = (chunk.border.clone(), self.moved(&chunk));
+        let parallel = mesh.triangles.len() > PARALLEL * self.options.desired_tris as usize;
+        let chunks = self.stages.time(Stage::Cut, || self.divide(chunk, resolution));
+        // What no plane divides would not be divided by the next ones either.
+        let divided = chunks.len() > 1 || self.options.tree == TreeShape::Thesis;
+        let children: Vec<(Chunk, NodePlan)> = chunks
+            .into_iter()
+            .map(|chunk| {
+                let triangles = chunk.mesh.triangles.len();
+                let plan = self.resolutions.child(triangles, resolution, chunk.path.len());
+                (chunk, if divided { plan } else { NodePlan::Leaf })
+            })
+            .collect();
+        let all_leaves = children.iter().all(|(_, plan)| *plan == NodePlan::Leaf);
+        if all_leaves || self.options.simplify_from == SimplifyFrom::Original {
+            let from_original = || {
+                let source = self.original(mesh, border, moved, &node);
+                self.coarse_node(source, node)
+            };
+            let (coarse, built) =
+                rayon::join(from_original, || self.children(children, child_path, parallel, false));
+            let ((record, surface), built) = (coarse?, built?);
+            let children = built.into_iter().map(|built| built.tree).collect();
+            return Ok(Built { tree: Tree { record, children }, surface: Some(surface) });
+        }
+        drop((mesh, border));
+        let built = self.children(children, child_path, parallel, true)?;
+        let (trees, surfaces): (Vec<_>, Vec<_>) =
+            built.into_iter().map(|built| (built.tree, built.surface)).unzip();
+        let source = join(surfaces.into_iter().flatten().collect(), path.len());
+        let (record, surface) = self.coarse_node(source, node)?;
+        Ok(Built { tree: Tree { record, children: trees }, surface: Some(surface) })
+    }
+
+    fn children(
+        &self,
+        children: Vec<(Chunk, NodePlan)>,
+        child_path: &[u32],
+        parallel: bool,
+        wanted: bool,
+    ) -> Result<Vec<Built<S::Record>>> {
+        let build = |(number, (chunk, plan)): (usize, (Chunk, NodePlan))| {
+            let mut path = child_path.to_vec();
+            path.push(number as u32);
+            self.subtree(chunk, plan, &path, wanted)
+        };
+        if parallel {
+            children.into_par_iter().enumerate().map(build).collect()
+        } else {
+            children.into_iter().enumerate().map(build).collect()
+        }
+    }
+
+    fn leaf(&self, chunk: Chunk, child_path: &[u32], wanted: bool) -> Result<Built<S::Record>> {
+        let moved = self.moved(&chunk);
+        let triangles = chunk.mesh.triangles.len();
+        let resolution = self.resolutions.last();
+        let record = self.sink.take(&NodeDraft {
+            mesh: &chunk.mesh,
+            skirts: &[],
+            resolution,
+            child_path,
+            budget: triangles,
+            error: SurfaceError::default().plus(moved),
+            step: LadderStep::Original,
+            baked: None,
+            locked: 0,
+        })?;
+        self.sink.leaves_done(triangles);
+        let surface = wanted.then(|| {
+            let path = chunk.path.clone();
+            let node = CoarseNode { path: &path, resolution, child_path, budget: triangles };
+            self.original(chunk.mesh, chunk.border, moved, &node)
+        });
+        Ok(Built { tree: Tree { record, children: Vec::new() }, surface })
+    }
+
+    /// A chunk of the original as what a node is simplified from.
+    fn original(&self, mesh: Mesh, border: Border, moved: f64, node: &CoarseNode) -> NodeSurface {
+        let spans = match self.options.borders {
+            BorderMode::Skirts => original_spans(&mesh, &border, node.path),
+            BorderMode::Locked | BorderMode::Shared => Vec::new(),
+        };
+        let original = self.stages.time(Stage::Measure, || Arc::new(Original::of(&mesh)));
+        let error = SurfaceError::default().plus(moved);
+        NodeSurface { mesh, border, spans, original, moved, error, baked: false }
+    }
+}
+
+/// The children of a node as one surface; `planes` are those of the node's own path.
+fn join(parts: Vec<NodeSurface>, planes: usize) -> NodeSurface {
+    let pairs: Vec<(&Mesh, &Border)> =
+        parts.iter().map(|part| (&part.mesh, &part.border)).collect();
+    let (mesh, border) = merge(&pairs, planes);
+    let original = Original::union(parts.iter().map(|part| Arc::clone(&part.original)).collect());
+    NodeSurface {
+        mesh,
+        border,
+        original: Arc::new(original),
+        moved: parts.iter().map(|part| part.moved).fold(0.0, f64::max),
+        error: parts.iter().fold(SurfaceError::default(), |most, part| most.at_least(&part.error)),
+        baked: parts.iter().any(|part| part.baked),
+        spans: parts.into_iter().flat_map(|part| part.spans).collect(),
+    }
+}

@@ -1,0 +1,60 @@
+//! Finished nodes and where they go.
+
+use crate::Result;
+use crate::builder::border::skirt::Skirt;
+use crate::builder::error::SurfaceError;
+use crate::builder::simplify::ladder::LadderStep;
+use crate::mesh::Mesh;
+use crate::texture::BakeReason;
+
+/// A finished node, on its way to disk.
+#[derive(Debug)]
+pub struct NodeDraft<'a> {
+    /// Geometry with source texture coordinates, without skirts.
+    pub mesh: &'a Mesh,
+    /// What closes its borders.
+    pub skirts: &'a [Skirt],
+    /// How far it is simplified ([`super::shape`]): 0 is the block's coarsest, the last the
+    /// leaves'.
+    pub resolution: usize,
+    /// Child numbers from the root down; empty for the root.
+    pub child_path: &'a [u32],
+    /// The triangles that it may have.
+    pub budget: usize,
+    /// Distance from the original; 0 for leaves, where they are not quantised.
+    pub error: SurfaceError,
+    /// How it was made.
+    pub step: LadderStep,
+    /// Why it needs a texture of its own, where it does.
+    pub baked: Option<BakeReason>,
+    /// Border vertices that were locked.
+    pub locked: usize,
+}
+
+impl NodeDraft<'_> {
+    /// Steps from its block's root.
+    pub fn level(&self) -> usize {
+        self.child_path.len()
+    }
+}
+
+/// Takes finished nodes, from many threads at once.
+pub trait NodeSink: Sync {
+    /// What is kept of a node once it is written.
+    type Record: Send;
+
+    /// Writes a node.
+    fn take(&self, node: &NodeDraft) -> Result<Self::Record>;
+
+    /// Called when chunks holding this many source triangles have become leaves.
+    fn leaves_done(&self, _triangles: usize) {}
+}
+
+/// A node's record and its children.
+#[derive(Debug)]
+pub struct Tree<R> {
+    /// Of the node itself.
+    pub record: R,
+    /// In the order in which they were cut off.
+    pub children: Vec<Tree<R>>,
+}

@@ -1,0 +1,88 @@
+//! How one block is built.
+
+use crate::builder::cut::split::CutTolerance;
+use crate::builder::simplify::ladder::{AppearanceWeights, Simplifier};
+use crate::texture::Seams;
+
+/// What a coarse node is simplified from.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum SimplifyFrom {
+    /// The original triangles of its chunk, as the thesis does it.
+    Original,
+    /// Its children's results: every triangle is touched about once, not once a level.
+    #[default]
+    Children,
+}
+
+/// What happens to vertices on cutting planes.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum BorderMode {
+    /// None is ever removed: no gaps, and a large part of every coarse node's budget.
+    Locked,
+    /// Thinned alike on both sides; gaps between different levels stay open.
+    Shared,
+    /// Thinned alike on both sides, and the gaps between different levels closed by skirts.
+    #[default]
+    Skirts,
+}
+
+/// The shape of a block's tree.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum TreeShape {
+    /// As deep as the geometry needs: even ratios between levels, cuts that balance triangles, and
+    /// a leaf wherever a chunk fits ([`super::shape`]).
+    #[default]
+    Balanced,
+    /// The thesis's law (section 3.2): `simplification_0 = N / desired_tris`, divided by
+    /// `level_factor` at every level until it falls below 1; slabs of even width across the longest
+    /// side; all branches equally deep.
+    Thesis,
+}
+
+/// How one block is built.
+#[derive(Clone, Debug)]
+pub struct HierarchyOptions {
+    /// See [`TreeShape`].
+    pub tree: TreeShape,
+    /// Desired triangles of a node (`c_desiredTris`), at least 1.
+    pub desired_tris: u32,
+    /// Ratio of triangles and texels between levels (`c_levelFactor`), at least 2.
+    pub level_factor: u32,
+    /// See [`SimplifyFrom`].
+    pub simplify_from: SimplifyFrom,
+    /// See [`Simplifier`].
+    pub simplifier: Simplifier,
+    /// See [`BorderMode`].
+    pub borders: BorderMode,
+    /// See [`AppearanceWeights`].
+    pub weights: AppearanceWeights,
+    /// See [`Seams`].
+    pub seams: Seams,
+    /// See [`CutTolerance`].
+    pub tolerance: CutTolerance,
+}
+
+impl Default for HierarchyOptions {
+    fn default() -> Self {
+        Self {
+            tree: TreeShape::default(),
+            desired_tris: 900,
+            level_factor: 4,
+            simplify_from: SimplifyFrom::default(),
+            simplifier: Simplifier::default(),
+            borders: BorderMode::default(),
+            weights: AppearanceWeights::default(),
+            seams: Seams::default(),
+            tolerance: CutTolerance::default(),
+        }
+    }
+}

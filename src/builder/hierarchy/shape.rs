@@ -1,0 +1,189 @@
+//! How deep a tree is, and how many triangles each of its nodes may have.
+//!
+//! A *resolution* is a step of simplification: resolution 0 is the block's coarsest, the last is
+//! the original. With `N` triangles in the block, `desired_tris = D` and `level_factor = f` there
+//! are `k = round(log_f(N / D))` steps of one ratio `r = (N / D)^(1/k)` between them, so that what
+//! remains of the division is spread over all steps rather than left to the last. A node of `n`
+//! source triangles at resolution `i` may have `n / r^(k - i)`.
+//!
+//! In [`TreeShape::Balanced`] a chunk is a leaf once no step of simplification is left that would
+//! save anything (`n < sqrt(f) * D`, where `round(log_f(n / D))` is 0), and skips resolutions where
+//! it has far fewer triangles than its siblings. In [`TreeShape::Thesis`] resolutions are levels.
+
+use super::options::{HierarchyOptions, TreeShape};
+
+/// A chunk at the last resolution but one is a leaf up to so many times the triangles of others:
+/// cuts are not perfectly even, and another level for a few triangles more would be of tiny nodes.
+const LAST_STEP_TOLERANCE: f64 = 2.0;
+
+/// A tree is not cut deeper than this many planes ([`crate::builder::border::vertex::PlaneSet`]
+/// holds 64, and each child is behind at most 6 more).
+const MOST_PLANES: usize = 58;
+
+/// The resolutions of one block.
+#[derive(Clone, Debug)]
+pub struct Resolutions {
+    tree: TreeShape,
+    desired_tris: f64,
+    level_factor: f64,
+    /// Source triangles for one of a node, by resolution; the last is the leaves' and is 1.
+    factors: Vec<f64>,
+}
+
+/// What becomes of a chunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NodePlan {
+    /// It is a leaf.
+    Leaf,
+    /// It is divided, and a coarse node stands for it.
+    Coarse {
+        /// Of the coarse node.
+        resolution: usize,
+        /// The triangles that it may have.
+        budget: usize,
+    },
+}
+
+impl Resolutions {
+    /// For a block of so many triangles.
+    pub fn new(triangles: usize, options: &HierarchyOptions) -> Self {
+        let (desired_tris, level_factor) =
+            (f64::from(options.desired_tris), f64::from(options.level_factor));
+        let ratio = triangles as f64 / desired_tris;
+        let factors = match options.tree {
+            TreeShape::Thesis => thesis_factors(ratio, level_factor),
+            TreeShape::Balanced => {
+                let steps = steps(ratio, level_factor).max(0) as usize;
+                let root = |exponent: usize| {
+                    let share = exponent as f64 / steps as f64;
+                    if exponent == 0 { 1.0 } else { libm::pow(ratio, share) }
+                };
+                (0..=steps).rev().map(root).collect()
+            }
+        };
+        Self { tree: options.tree, desired_tris, level_factor, factors }
+    }
+
+    /// Source triangles for one of a node, by resolution, coarsest first; the last is 1.
+    pub fn factors(&self) -> &[f64] {
+        &self.factors
+    }
+
+    /// The resolution of leaves.
+    pub fn last(&self) -> usize {
+        self.factors.len() - 1
+    }
+
+    /// What becomes of the whole block.
+    pub fn root(&self, triangles: usize) -> NodePlan {
+        if self.last() == 0 { NodePlan::Leaf } else { self.coarse(triangles, 0) }
+    }
+
+    /// What becomes of a chunk of so many triangles below a node at `parent`, behind so many
+    /// planes.
+    pub fn child(&self, triangles: usize, parent: usize, planes: usize) -> NodePlan {
+        let next = parent + 1;
+        if self.tree == TreeShape::Thesis {
+            let deep = next == self.last() || planes > MOST_PLANES;
+            return if deep { NodePlan::Leaf } else { self.coarse(triangles, next) };
+        }
+        let ratio = triangles as f64 / self.desired_tris;
+        if steps(ratio, self.level_factor) <= 0 || planes > MOST_PLANES {
+            return NodePlan::Leaf;
+        }
+        if next >= self.last() {
+            let most = LAST_STEP_TOLERANCE * self.level_factor.sqrt();
+            return if ratio < most { NodePlan::Leaf } else { self.coarse(triangles, parent) };
+        }
+        // The coarsest resolution that gives the node about the triangles that are desired.
+        let nearest = (next..self.last()).min_by(|&a, &b| {
+            let off = |resolution: usize| {
+                let budget = ratio / self.factors[resolution];
+                budget.max(1.0 / budget)
+            };
+            off(a).total_cmp(&off(b))
+        });
+        self.coarse(triangles, nearest.unwrap_or(next))
+    }
+
+    fn coarse(&self, triangles: usize, resolution: usize) -> NodePlan {
+        let budget = (triangles as f64 / self.factors[resolution]).round() as usize;
+        NodePlan::Coarse { resolution, budget: budget.max(1) }
+    }
+}
+
+/// Steps by about `level_factor` that divide by `ratio` in all; none or fewer below its root.
+fn steps(ratio: f64, level_factor: f64) -> i64 {
+    // libm's, which is alike on all machines.
+    (libm::log(ratio) / libm::log(level_factor)).round() as i64
+}
+
+/// The thesis's factors: divided by the level factor until they fall below 1.
+fn thesis_factors(ratio: f64, level_factor: f64) -> Vec<f64> {
+    let mut factors = Vec::new();
+    let mut factor = ratio;
+    while factor > 1.0 {
+        factors.push(factor);
+        factor /= level_factor;
+    }
+    factors.push(1.0);
+    factors
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn resolutions(triangles: usize, tree: TreeShape) -> Resolutions {
+        let options =
+            HierarchyOptions { tree, desired_tris: 900, level_factor: 4, ..Default::default() };
+        Resolutions::new(triangles, &options)
+    }
+
+    #[test]
+    fn factors_follow_the_thesis() {
+        let of = |triangles| resolutions(triangles, TreeShape::Thesis).factors;
+        assert_eq!(of(900), [1.0], "within the budget: one node");
+        assert_eq!(of(901).len(), 2);
+        assert_eq!(of(900 * 64), [64.0, 16.0, 4.0, 1.0]);
+        let factors = of(230_000);
+        assert!((factors[0] - 255.5555).abs() < 1e-3);
+        assert_eq!(factors.len(), 5, "255.6, 63.9, 16.0, 3.99, and the original");
+    }
+
+    #[test]
+    fn ratios_are_even_and_never_a_small_last_one() {
+        for triangles in (1..400).map(|n| n * n * 60) {
+            let factors = resolutions(triangles, TreeShape::Balanced).factors;
+            assert_eq!(factors[factors.len() - 1], 1.0);
+            for pair in factors.windows(2) {
+                let ratio = pair[0] / pair[1];
+                assert!((2.0 - 1e-9..=8.0 + 1e-9).contains(&ratio), "{triangles}: {factors:?}");
+                assert!((ratio / (factors[0] / factors[1]) - 1.0).abs() < 1e-9);
+            }
+            let root = triangles as f64 / factors[0];
+            assert!(factors.len() == 1 || (root - 900.0).abs() < 1e-6, "{root}");
+            assert!(factors.len() > 1 || triangles < 1800, "{triangles}");
+        }
+        // 4, 4, 4, 1.45 by the thesis's law.
+        let factors = resolutions(83_520, TreeShape::Balanced).factors;
+        assert_eq!(factors.len(), 4);
+        assert!((factors[2] - 4.527).abs() < 1e-3, "{factors:?}");
+    }
+
+    #[test]
+    fn chunks_that_fit_are_leaves_and_small_ones_skip_resolutions() {
+        let all = resolutions(900 * 256, TreeShape::Balanced);
+        assert_eq!(all.factors.len(), 5);
+        let coarse = |resolution, budget| NodePlan::Coarse { resolution, budget };
+        assert_eq!(all.root(900 * 256), coarse(0, 900));
+        assert_eq!(all.child(900 * 64, 0, 2), coarse(1, 900));
+        assert_eq!(all.child(900 * 4, 0, 2), coarse(3, 900));
+        for parent in 0..3 {
+            assert_eq!(all.child(1700, parent, 2), NodePlan::Leaf);
+        }
+        assert_eq!(all.child(3500, 3, 8), NodePlan::Leaf, "a little more than it should have");
+        assert_eq!(all.child(3700, 3, 8), coarse(3, 925));
+        assert_eq!(all.child(900 * 64, 0, 60), NodePlan::Leaf, "no plane is left");
+    }
+}

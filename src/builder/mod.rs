@@ -1,0 +1,30 @@
+//! From imported models to nodes on disk.
+//!
+//! - [`pipeline`]: the whole build; [`block`]: one input to the trees of its blocks
+//! - [`blocks`]: what a block is: groups merged, divided and gathered
+//! - [`hierarchy`]: the tree of one block
+//! - [`cut`]: planes, and the triangles that cross them
+//! - [`border`]: what planes leave behind: thinning, skirts, caps
+//! - [`simplify`]: bringing a node to its triangle budget
+//! - [`error`]: the distance between a node and the original
+//! - [`emit`]: nodes as files
+
+pub mod block;
+pub mod blocks;
+pub mod border;
+pub mod cut;
+pub mod emit;
+pub mod error;
+pub mod hierarchy;
+pub mod inputs;
+pub mod memory;
+pub mod options;
+pub mod pipeline;
+pub mod progress;
+pub mod reuse;
+pub mod simplify;
+pub mod stages;
+pub mod up;
+
+pub use options::BuildOptions;
+pub use pipeline::{Outcome, build};

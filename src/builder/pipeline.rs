@@ -1,0 +1,396 @@
+//! The whole build: inputs one after another, blocks in parallel, everything in its place at the
+//! end or nothing changed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::builder::block::{BuiltBlock, build_input};
+use crate::builder::emit::disk_sink::{NodeRecord, check_unique};
+use crate::builder::emit::forest::{append_nodes, make_errors_monotone};
+use crate::builder::inputs::{describe, fingerprint, text_of, unchanged};
+use crate::builder::options::BuildOptions;
+use crate::builder::progress::Progress;
+use crate::builder::reuse::Earlier;
+use crate::builder::simplify::ladder::{BUDGET_TOLERANCE, LadderStep};
+use crate::builder::stages::{Stage, Stages};
+use crate::cpu_time::CpuTime;
+use crate::format::{
+    BlockInfo, NODES_DIR, Node, OutputDir, REPORT_FILE, SCENE_FILE, Scene, SharedTexture,
+    TEXTURES_DIR, check_apart, fits_in_steps,
+};
+use crate::lattice::Quantization;
+use crate::mesh::{Model, UpAxis, Warnings};
+use crate::place::placement_of;
+use crate::place::{Globe, z_up};
+use crate::report::build_report::{
+    Baked, BuildReport, Count, FileReport, InputReport, OverBudget, Quantized, StageReport, UpFrom,
+    level_reports,
+};
+use crate::texture::{BakeReason, SharedTextures};
+use crate::{Error, Result, import, tileset};
+
+/// How a build ended.
+#[derive(Debug)]
+pub enum Outcome {
+    /// Nothing had changed; nothing was done. Holds the report of the build that made the result.
+    UpToDate(BuildReport),
+    /// A new result stands in the output folder.
+    Built(BuildReport),
+}
+
+/// Builds `out` from model files and folders.
+pub fn build(
+    arguments: &[PathBuf],
+    out: &Path,
+    options: &BuildOptions,
+    progress: &dyn Progress,
+) -> Result<Outcome> {
+    let begin = Instant::now();
+    options.check()?;
+    let globe = options.placement.globe()?;
+    let inputs = import::find_inputs(arguments)?;
+    // A folder that was given counts as a whole: what is built into it would be an input the next
+    // time.
+    check_apart(out, arguments.iter().chain(&inputs))?;
+    let stages = Stages::default();
+    let parameters = options.to_json();
+
+    let earlier = if options.force { None } else { Earlier::open(out, &parameters) };
+    let still_good: Vec<Option<InputReport>> = stages.time(Stage::Compare, || {
+        let same = |input: &PathBuf| {
+            let report = earlier.as_ref()?.input(&text_of(input))?;
+            unchanged(report).then(|| report.clone())
+        };
+        inputs.iter().map(same).collect()
+    });
+    if let Some(earlier) = &earlier
+        && still_good.iter().all(Option::is_some)
+        && earlier.report.inputs.len() == inputs.len()
+        && earlier.tileset
+    {
+        return Ok(Outcome::UpToDate(earlier.report.clone()));
+    }
+
+    let output = OutputDir::create(out)?;
+    let shared = SharedTextures::new();
+    let mut reports: Vec<InputReport> = Vec::with_capacity(inputs.len());
+    let mut blocks: Vec<BuiltBlock> = Vec::new();
+    let mut reused_textures: BTreeMap<String, SharedTexture> = BTreeMap::new();
+    let mut ahead: Option<Result<Model>> = None;
+
+    for (number, input) in inputs.iter().enumerate() {
+        if let (Some(report), Some(earlier)) = (&still_good[number], &earlier) {
+            let taken = earlier.take_over(report, &output)?;
+            progress.built(report.triangles);
+            reused_textures.extend(taken.shared_textures);
+            blocks.extend(taken.blocks);
+            reports.push(report.clone());
+            continue;
+        }
+        progress.reading(input, number + 1, inputs.len());
+        let load = |input: &Path| {
+            let cpu_time = CpuTime::default();
+            let model = import::load_timed(input, &cpu_time);
+            stages.add(Stage::Import, cpu_time.total());
+            model
+        };
+        let mut model = match ahead.take() {
+            Some(model) => model,
+            None => load(input),
+        }?;
+        let next = inputs[number + 1..]
+            .iter()
+            .zip(&still_good[number + 1..])
+            .find(|(_, good)| good.is_none())
+            .map(|(next, _)| next)
+            .filter(|next| {
+                // Only the input that comes next in turn, and only where both fit in memory.
+                still_good.get(number + 1).is_some_and(Option::is_none) && fits_beside(input, next)
+            });
+        let dependencies = model.dependencies.clone();
+        let triangles = model.triangle_count() as u64;
+        progress.found(triangles);
+        let (up, up_from) = match (options.up, model.up) {
+            (Some(up), _) => (up, UpFrom::Option),
+            (None, Some(up)) => (up, UpFrom::Format),
+            // Degrees beside metres have no shape.
+            (None, None) if options.placement.is_degrees() => (UpAxis::Z, UpFrom::Degrees),
+            (None, None) => (crate::builder::up::guess(&model), UpFrom::Shape),
+        };
+        options.placement.localise(&mut model, up)?;
+        check_place(&model, up, globe.as_ref())?;
+        if let Some(quantization) = options.quantization() {
+            quantization.check(&model)?;
+            if inputs.len() == 1 {
+                quantization.check_extent(model.bounds())?;
+            }
+        }
+        let ((built, files), read_ahead) = rayon::join(
+            || {
+                rayon::join(
+                    || build_input(model, up, options, &output, &shared, &stages, progress),
+                    || describe(&dependencies, &stages),
+                )
+            },
+            || next.map(|next| load(next)),
+        );
+        ahead = read_ahead;
+        let (built, files) = (built?, files?);
+        let mut warnings = built.warnings;
+        let outcomes = outcomes(&built.blocks, &mut warnings);
+        reports.push(InputReport {
+            path: text_of(input),
+            files,
+            triangles,
+            texels: built.used_texels,
+            up,
+            up_from: Some(up_from),
+            outcomes,
+            warnings: Count::of_warnings(&warnings),
+        });
+        blocks.extend(built.blocks);
+    }
+    progress.finishing();
+
+    let source_triangles = reports.iter().map(|input| input.triangles).sum();
+    let source_texels =
+        reports.iter().map(|input| input.texels).sum::<u64>() + shared.source_texels();
+    let mut shared_textures = reused_textures;
+    for file in shared.into_files() {
+        let texture = SharedTexture {
+            file_name: file.name.to_string(),
+            width: file.width,
+            height: file.height,
+            bytes: file.bytes.len() as u64,
+        };
+        if shared_textures.insert(file.name.to_string(), texture).is_none() {
+            output.write(format!("{TEXTURES_DIR}/{}", file.name), &file.bytes)?;
+        }
+    }
+    let mut warnings = Warnings::default();
+    for warning in reports.iter().flat_map(|input| &input.warnings) {
+        warnings.add(&warning.text, warning.count);
+    }
+    if let Some(earlier) = &earlier
+        && earlier.report.tilesets.is_empty()
+    {
+        let file = crate::format::TILESET_FILE;
+        let text =
+            format!("earlier result without {file} (by an older version): added to its nodes");
+        warnings.add(text, 1);
+    }
+    if let Some(caveat) = globe.as_ref().and_then(Globe::caveat) {
+        warnings.add(caveat, 1);
+    }
+    let over_budget = over_budget(&blocks, &mut warnings);
+    let baked = baked(&blocks);
+    let up = agreed_up(&reports, &mut warnings);
+    let scene = scene_of(blocks, shared_textures, parameters.clone(), up, &reports)?;
+
+    if let (Some(quantization), Some(bounds)) = (options.quantization(), scene.bounds()) {
+        quantization.check_extent(bounds)?;
+    }
+    // As whoever reads the scene will see it.
+    let placement = placement_of(&scene.parameters)?;
+    let mut tilesets = Vec::new();
+    for file in stages.time(Stage::Write, || tileset::files(&scene, &placement))? {
+        output.write(&file.path, &file.bytes)?;
+        tilesets.push(FileReport::of(&file.path, &file.bytes));
+    }
+    let mut levels = level_reports(&scene);
+    for over in &over_budget {
+        if let Some(node) = scene.nodes.iter().find(|node| node.id == over.id) {
+            levels[node.level as usize].over_budget += 1;
+        }
+    }
+    let quantized = options.quantization().map(|quantization| quantized(&scene, quantization));
+    let report = BuildReport {
+        version: env!("CARGO_PKG_VERSION").into(),
+        parameters,
+        source_triangles,
+        source_texels,
+        levels,
+        stages: Stage::ALL
+            .map(|stage| StageReport { stage: stage.name().into(), seconds: stages.seconds(stage) })
+            .to_vec(),
+        seconds: begin.elapsed().as_secs_f64(),
+        peak_memory_bytes: crate::builder::memory::peak_bytes(),
+        outcomes: most_frequent(reports.iter().flat_map(|input| &input.outcomes).cloned()),
+        inputs: reports,
+        tilesets,
+        quantized,
+        over_budget,
+        baked,
+        warnings: Count::of_warnings(&warnings),
+    };
+    output.write(SCENE_FILE, &scene.to_bytes()?)?;
+    output.write(REPORT_FILE, report.to_json()?.as_bytes())?;
+    output.commit()?;
+    Ok(Outcome::Built(report))
+}
+
+fn quantized(scene: &Scene, quantization: Quantization) -> Quantized {
+    let Quantization { step } = quantization;
+    let is_large = |node: &&Node| !fits_in_steps(node.bbox_min, node.bbox_max, step);
+    Quantized {
+        step_metres: step,
+        bound_metres: quantization.bound(),
+        large_nodes: scene.nodes.iter().filter(is_large).count() as u64,
+    }
+}
+
+/// Refuses coordinates that cannot be of the place that was asked for.
+fn check_place(model: &Model, up: UpAxis, globe: Option<&Globe>) -> Result<()> {
+    let Some(globe) = globe else { return Ok(()) };
+    let [low, high] = model.bounds();
+    let (low, high) = z_up(up, low, high);
+    match globe.misfit(low, high) {
+        Some(what) => Err(Error::input(&model.source, what)),
+        None => Ok(()),
+    }
+}
+
+/// An input is read while the one before it is built, unless both are large: a file's model takes
+/// about as many bytes as its text.
+fn fits_beside(current: &Path, next: &Path) -> bool {
+    let bytes = |path: &Path| std::fs::metadata(path).map_or(0, |facts| facts.len());
+    bytes(current) + bytes(next) <= crate::builder::memory::total_bytes() / 16
+}
+
+/// One direction for the whole scene; the first input's where they differ.
+fn agreed_up(inputs: &[InputReport], warnings: &mut Warnings) -> UpAxis {
+    let first = inputs.first().map_or(UpAxis::Z, |input| input.up);
+    let others = inputs.iter().filter(|input| input.up != first).count() as u64;
+    warnings.add(
+        format!("input with another up axis than the first ({first:?}); set --up to choose one"),
+        others,
+    );
+    first
+}
+
+/// How the nodes of an input were made; what was imperfect in them is added to `warnings`.
+fn outcomes(blocks: &[BuiltBlock], warnings: &mut Warnings) -> Vec<Count> {
+    let mut steps = Vec::new();
+    for block in blocks {
+        block.for_each(&mut |record: &NodeRecord| {
+            let baked = record.baked.filter(|_| record.step.is_some()).map(BakeReason::describe);
+            let texts = record.step.map(LadderStep::describe).into_iter().chain(baked);
+            steps.extend(texts.map(|text| Count { text: text.into(), count: 1 }));
+            warnings.extend(record.warnings.clone());
+        });
+    }
+    most_frequent(steps)
+}
+
+/// Sums up equal texts; the most frequent first, then by text.
+fn most_frequent(counts: impl IntoIterator<Item = Count>) -> Vec<Count> {
+    let mut sums: BTreeMap<String, u64> = BTreeMap::new();
+    for Count { text, count } in counts {
+        *sums.entry(text).or_insert(0) += count;
+    }
+    let mut sums: Vec<Count> =
+        sums.into_iter().map(|(text, count)| Count { text, count }).collect();
+    sums.sort_by_key(|sum| std::cmp::Reverse(sum.count));
+    sums
+}
+
+/// The nodes that have more triangles than they may, by id.
+fn over_budget(blocks: &[BuiltBlock], warnings: &mut Warnings) -> Vec<OverBudget> {
+    let mut over_budget = Vec::new();
+    for block in blocks {
+        block.for_each(&mut |record: &NodeRecord| {
+            over_budget.extend(record.reason.clone().map(|reason| OverBudget {
+                id: record.id,
+                file: record.file.clone(),
+                budget: record.budget as u64,
+                triangles: u64::from(record.attributes.triangles),
+                reason,
+            }));
+        });
+    }
+    over_budget.sort_by_key(|over| over.id);
+    warnings.add(
+        format!(
+            "node with more than {:.0} % above its triangle budget (see over_budget in {})",
+            (BUDGET_TOLERANCE - 1.0) * 100.0,
+            REPORT_FILE
+        ),
+        over_budget.len() as u64,
+    );
+    over_budget
+}
+
+/// The nodes with textures of their own, by id.
+fn baked(blocks: &[BuiltBlock]) -> Vec<Baked> {
+    let mut baked = Vec::new();
+    for block in blocks {
+        block.for_each(&mut |record: &NodeRecord| {
+            let entry = |reason| Baked { id: record.id, file: record.file.clone(), reason };
+            baked.extend(record.baked.map(entry));
+        });
+    }
+    baked.sort_by_key(|baked: &Baked| baked.id);
+    baked
+}
+
+/// Joins the blocks' trees to a scene.
+fn scene_of(
+    blocks: Vec<BuiltBlock>,
+    shared_textures: BTreeMap<String, SharedTexture>,
+    parameters: serde_json::Value,
+    up: UpAxis,
+    reports: &[InputReport],
+) -> Result<Scene> {
+    let numbers: BTreeMap<String, u32> = shared_textures.keys().cloned().zip(0u32..).collect();
+    let mut nodes = Vec::new();
+    let mut infos: Vec<BlockInfo> = Vec::with_capacity(blocks.len());
+    for mut block in blocks {
+        make_errors_monotone(&mut block.tree);
+        append_nodes(&mut nodes, block.tree, infos.len() as u32, &numbers);
+        infos.push(block.info);
+    }
+    if nodes.is_empty() {
+        return Err(Error::Internal("a build without nodes".into()));
+    }
+    let mut ids: Vec<_> = nodes.iter().map(|node| (node.id, node.file.clone())).collect();
+    check_unique(&mut ids)?;
+    Ok(Scene {
+        fingerprint: fingerprint(&parameters, reports),
+        parameters,
+        up,
+        blocks: infos,
+        shared_textures: shared_textures.into_values().collect(),
+        nodes,
+    })
+}
+
+/// The folder of nodes of a result, for those who read them.
+pub fn nodes_dir(out: &Path) -> PathBuf {
+    out.join(NODES_DIR)
+}
+
+/// More threads than any machine has cores would only take its memory.
+const MOST_THREADS: usize = 1024;
+
+/// Runs a build on a pool of its own with this many threads; 0 is one per core.
+pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T> {
+    if threads > MOST_THREADS {
+        return Err(Error::Usage(format!("{threads} threads, expected 0 to {MOST_THREADS}")));
+    }
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| Error::Usage(format!("{threads} threads cannot be started: {error}")))
+        .map(|pool| pool.install(work))
+}
+
+/// Blocks of an input in parallel, in order.
+pub(super) fn in_parallel<I: Send, O: Send>(
+    items: Vec<I>,
+    work: impl Fn(usize, I) -> Result<O> + Sync,
+) -> Result<Vec<O>> {
+    items.into_par_iter().enumerate().map(|(number, item)| work(number, item)).collect()
+}

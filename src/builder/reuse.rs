@@ -1,0 +1,149 @@
+//! Taking over from an earlier result what has not changed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use crate::Result;
+use crate::builder::block::BuiltBlock;
+use crate::builder::emit::disk_sink::NodeRecord;
+use crate::builder::hierarchy::Tree;
+use crate::builder::options::same_nodes;
+use crate::format::attributes::Attributes;
+use crate::format::{NODES_DIR, OutputDir, REPORT_FILE, Scene, SharedTexture, TEXTURES_DIR};
+use crate::mesh::Warnings;
+use crate::report::build_report::{BuildReport, FileReport, InputReport};
+
+/// A result whose nodes were made by this version with the same parameters, and are whole.
+pub struct Earlier {
+    dir: PathBuf,
+    /// Its scene.
+    pub scene: Scene,
+    /// How it was made.
+    pub report: BuildReport,
+    /// True where its tileset is whole, and for the same place.
+    pub tileset: bool,
+}
+
+fn is_as_written(dir: &Path, file: &FileReport) -> bool {
+    std::fs::read(dir.join(&file.path))
+        .is_ok_and(|bytes| FileReport::of(&file.path, &bytes) == *file)
+}
+
+/// What an unchanged input contributes.
+pub struct Taken {
+    /// Its blocks; their files are in the new output already.
+    pub blocks: Vec<BuiltBlock>,
+    /// Shared textures that its nodes use, by name; likewise.
+    pub shared_textures: BTreeMap<String, SharedTexture>,
+}
+
+impl Earlier {
+    /// `None` where there is none, or none that can be used.
+    pub fn open(dir: &Path, parameters: &serde_json::Value) -> Option<Self> {
+        let scene = Scene::read(dir).ok()?;
+        let text = std::fs::read_to_string(dir.join(REPORT_FILE)).ok()?;
+        let report: BuildReport = serde_json::from_str(&text).ok()?;
+        let same = report.version == env!("CARGO_PKG_VERSION")
+            && same_nodes(&report.parameters, parameters)
+            && report.parameters == scene.parameters;
+        let whole = || {
+            scene.nodes.iter().all(|node| {
+                std::fs::metadata(dir.join(NODES_DIR).join(&node.file))
+                    .is_ok_and(|facts| facts.len() == node.file_bytes)
+            }) && scene.shared_textures.iter().all(|texture| {
+                std::fs::metadata(dir.join(TEXTURES_DIR).join(&texture.file_name))
+                    .is_ok_and(|facts| facts.len() == texture.bytes)
+            })
+        };
+        if !(same && whole()) {
+            return None;
+        }
+        let tileset = !report.tilesets.is_empty()
+            && report.parameters == *parameters
+            && report.tilesets.par_iter().all(|file| is_as_written(dir, file));
+        Some(Self { dir: dir.to_path_buf(), scene, report, tileset })
+    }
+
+    /// What it knows of an input.
+    pub fn input(&self, path: &str) -> Option<&InputReport> {
+        self.report.inputs.iter().find(|input| input.path == path)
+    }
+
+    /// Links the files of an input's blocks into the new output.
+    pub fn take_over(&self, input: &InputReport, output: &OutputDir) -> Result<Taken> {
+        let mut taken = Taken { blocks: Vec::new(), shared_textures: BTreeMap::new() };
+        for root in self.scene.roots() {
+            let Some(block) = self.scene.nodes[root as usize].block else { continue };
+            let info = &self.scene.blocks[block as usize];
+            if info.input != input.path {
+                continue;
+            }
+            let tree = self.tree(root, output, &mut taken)?;
+            taken.blocks.push(BuiltBlock { info: info.clone(), tree });
+        }
+        for name in taken.shared_textures.keys() {
+            // Several inputs may share a picture.
+            let relative = format!("{TEXTURES_DIR}/{name}");
+            if !output.path().join(&relative).exists() {
+                output.reuse(&self.dir, relative)?;
+            }
+        }
+        Ok(taken)
+    }
+
+    fn tree(&self, index: u32, output: &OutputDir, taken: &mut Taken) -> Result<Tree<NodeRecord>> {
+        let node = &self.scene.nodes[index as usize];
+        output.reuse(&self.dir, format!("{NODES_DIR}/{}", node.file))?;
+        let mut shared = Vec::new();
+        for &number in &node.shared_textures {
+            let texture = &self.scene.shared_textures[number as usize];
+            shared.push((
+                texture.file_name.clone(),
+                u64::from(texture.width) * u64::from(texture.height),
+            ));
+            taken.shared_textures.insert(texture.file_name.clone(), texture.clone());
+        }
+        let children = self
+            .scene
+            .children(index)
+            .map(|child| self.tree(child, output, taken))
+            .collect::<Result<Vec<_>>>()?;
+        let over = self.report.over_budget.iter().find(|over| over.id == node.id);
+        // In order of id.
+        let baked = self.report.baked.binary_search_by_key(&node.id, |baked| baked.id);
+        let baked = baked.ok().map(|place| &self.report.baked[place]);
+        Ok(Tree {
+            record: NodeRecord {
+                id: node.id,
+                file: node.file.clone(),
+                file_bytes: node.file_bytes,
+                file_crc: node.file_crc,
+                origin: node.origin,
+                attributes: Attributes {
+                    triangles: node.triangles,
+                    textured_triangles: node.textured_triangles,
+                    vertices: node.vertices,
+                    bbox_min: node.bbox_min,
+                    bbox_max: node.bbox_max,
+                    cost: node.cost,
+                    static_benefit: node.static_benefit,
+                    average_normal: node.average_normal.map(f64::from),
+                },
+                geometric_error: node.geometric_error,
+                mean_error: node.mean_error,
+                p95_error: node.p95_error,
+                pictures: node.pictures.clone(),
+                shared,
+                level: node.level,
+                budget: over.map_or(0, |over| over.budget as usize),
+                step: None,
+                baked: baked.map(|baked| baked.reason),
+                reason: over.map(|over| over.reason.clone()),
+                warnings: Warnings::default(),
+            },
+            children,
+        })
+    }
+}

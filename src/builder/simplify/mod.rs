@@ -1,0 +1,12 @@
+//! Bringing a node to its triangle budget.
+
+mod aggregate;
+pub mod cluster;
+pub mod collapse;
+pub mod compact;
+pub mod fallback;
+pub mod ladder;
+pub mod merge;
+pub mod orient;
+pub mod split_mixed;
+pub mod weld_seams;

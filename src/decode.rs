@@ -1,0 +1,339 @@
+//! Decoding of textures to 8-bit RGB or RGBA.
+
+use std::borrow::Cow;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, Seek};
+use std::path::{Path, PathBuf};
+
+use image::{DynamicImage, ImageReader};
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+use crate::mesh::{TextureData, TextureSource};
+use crate::{Error, Result};
+
+/// Longest side of an image, in texels.
+const LONGEST_SIDE: u32 = 32_768;
+
+/// Most texels of an image: 2^29, which is 1.5 GiB as RGB.
+const MOST_TEXELS: u64 = 1 << 29;
+
+/// A decoded image, rows from the top, sRGB-encoded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DecodedTexture {
+    /// Width in texels, from 1.
+    pub width: u32,
+    /// Height in texels, from 1.
+    pub height: u32,
+    /// Bytes to a texel: 3 (RGB), or 4 (RGBA, alpha not premultiplied) where any alpha is below
+    /// 255.
+    pub channels: u8,
+    /// `width * height * channels` bytes.
+    pub pixels: Vec<u8>,
+}
+
+impl DecodedTexture {
+    /// The number of texels.
+    pub fn texels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+
+    /// Without its alpha channel.
+    pub fn into_opaque(self) -> Self {
+        if self.channels == 3 {
+            return self;
+        }
+        Self { channels: 3, pixels: without_alpha(&self.pixels), ..self }
+    }
+
+    /// True where some texel is not wholly opaque.
+    pub fn has_transparency(&self) -> bool {
+        self.channels == 4 && has_transparency(&self.pixels)
+    }
+}
+
+/// Of RGBA texels: true where some alpha is below 255.
+fn has_transparency(rgba: &[u8]) -> bool {
+    rgba.as_chunks::<4>().0.iter().any(|texel| texel[3] < 255)
+}
+
+/// RGB of RGBA texels.
+fn without_alpha(rgba: &[u8]) -> Vec<u8> {
+    rgba.as_chunks::<4>().0.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect()
+}
+
+/// Reads and decodes a texture: JPEG, PNG, and the other formats that `image` is built with.
+///
+/// 16-bit, grey and palette images become 8-bit RGB. The result is RGBA only where some alpha is
+/// below 255, from the image itself or from its opacity file, which may be of another size.
+pub fn decode_texture(source: &TextureSource) -> Result<DecodedTexture> {
+    let file = file_of(source);
+    let bytes = bytes_of(source)?;
+    let image = decode(&bytes).map_err(|what| refusal(&file, source, what))?;
+    let Some(opacity) = &source.opacity else { return Ok(image) };
+    let bytes = std::fs::read(opacity)
+        .map_err(|error| Error::input(opacity, format!("cannot be read: {error}")))?;
+    let mask = decode(&bytes).map_err(|what| Error::input(opacity, what))?;
+    Ok(with_opacity(image, &mask))
+}
+
+/// Width and height of a texture in texels, from its header alone.
+pub fn texture_size(source: &TextureSource) -> Result<(u32, u32)> {
+    let file = file_of(source);
+    let size = match &source.data {
+        TextureData::File(path) => {
+            let opened = File::open(path)
+                .map_err(|error| Error::input(path, format!("cannot be opened: {error}")))?;
+            size_of(BufReader::new(opened))
+        }
+        TextureData::Embedded(bytes) => size_of(Cursor::new(&bytes[..])),
+    };
+    size.map_err(|what| refusal(&file, source, what))
+}
+
+/// The file to name in messages.
+fn file_of(source: &TextureSource) -> PathBuf {
+    match &source.data {
+        TextureData::File(path) => path.clone(),
+        TextureData::Embedded(_) => PathBuf::from(&source.name),
+    }
+}
+
+fn refusal(file: &Path, source: &TextureSource, what: String) -> Error {
+    match source.data {
+        TextureData::File(_) => Error::input(file, what),
+        TextureData::Embedded(_) => Error::input(file, format!("embedded image: {what}")),
+    }
+}
+
+fn bytes_of(source: &TextureSource) -> Result<Cow<'_, [u8]>> {
+    match &source.data {
+        TextureData::Embedded(bytes) => Ok(Cow::Borrowed(&bytes[..])),
+        TextureData::File(path) => std::fs::read(path)
+            .map(Cow::Owned)
+            .map_err(|error| Error::input(path, format!("cannot be read: {error}"))),
+    }
+}
+
+/// Refuses what would not fit in memory.
+fn check_size(width: u32, height: u32) -> Result<(u32, u32), String> {
+    if width == 0 || height == 0 {
+        return Err(format!("is an image of {width} x {height} texels"));
+    }
+    let texels = u64::from(width) * u64::from(height);
+    if width > LONGEST_SIDE || height > LONGEST_SIDE || texels > MOST_TEXELS {
+        return Err(format!(
+            "is an image of {width} x {height} texels; expected at most {LONGEST_SIDE} a side and \
+             {MOST_TEXELS} in all"
+        ));
+    }
+    Ok((width, height))
+}
+
+fn is_jpeg(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0xff, 0xd8, 0xff])
+}
+
+fn size_of(mut reader: impl BufRead + Seek) -> Result<(u32, u32), String> {
+    let head = reader.fill_buf().map_err(|error| error.to_string())?;
+    if is_jpeg(head) {
+        let mut decoder = JpegDecoder::new_with_options(&mut reader, jpeg_options());
+        if decoder.decode_headers().is_ok()
+            && let Some(info) = decoder.info()
+        {
+            return check_size(info.width.into(), info.height.into());
+        }
+        reader.rewind().map_err(|error| error.to_string())?;
+    }
+    let (width, height) = ImageReader::new(reader)
+        .with_guessed_format()
+        .map_err(|error| error.to_string())?
+        .into_dimensions()
+        .map_err(|error| error.to_string())?;
+    check_size(width, height)
+}
+
+fn jpeg_options() -> DecoderOptions {
+    DecoderOptions::default()
+        .set_max_width(LONGEST_SIDE as usize)
+        .set_max_height(LONGEST_SIDE as usize)
+        .jpeg_set_out_colorspace(ColorSpace::RGB)
+}
+
+/// Decodes the bytes of an image file.
+fn decode(bytes: &[u8]) -> Result<DecodedTexture, String> {
+    let (width, height) = size_of(Cursor::new(bytes))?;
+    if is_jpeg(bytes) {
+        let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), jpeg_options());
+        if let Ok(pixels) = decoder.decode()
+            && pixels.len() as u64 == u64::from(width) * u64::from(height) * 3
+        {
+            return Ok(DecodedTexture { width, height, channels: 3, pixels });
+        }
+        // What the fast path cannot do (CMYK, for one) is left to `image`.
+    }
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|error| error.to_string())?;
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(LONGEST_SIDE);
+    limits.max_image_height = Some(LONGEST_SIDE);
+    // The widest texel is four times 32-bit float.
+    limits.max_alloc = Some(u64::from(width) * u64::from(height) * 16 + (64 << 20));
+    reader.limits(limits);
+    let image = reader.decode().map_err(|error| error.to_string())?;
+    Ok(from_image(image))
+}
+
+/// 8-bit RGB, or RGBA where any alpha is below 255.
+fn from_image(image: DynamicImage) -> DecodedTexture {
+    let (width, height) = (image.width(), image.height());
+    if image.color().has_alpha() {
+        let pixels = image.into_rgba8().into_raw();
+        if has_transparency(&pixels) {
+            return DecodedTexture { width, height, channels: 4, pixels };
+        }
+        return DecodedTexture { width, height, channels: 3, pixels: without_alpha(&pixels) };
+    }
+    DecodedTexture { width, height, channels: 3, pixels: image.into_rgb8().into_raw() }
+}
+
+/// `image` with the alpha of `mask`, or its luminance where it has no alpha, resampled.
+fn with_opacity(image: DecodedTexture, mask: &DecodedTexture) -> DecodedTexture {
+    let (width, height) = (image.width, image.height);
+    let opacity: Vec<u8> = if mask.channels == 4 {
+        mask.pixels.as_chunks::<4>().0.iter().map(|texel| texel[3]).collect()
+    } else {
+        // Rec. 709 weights in 1/256 on the encoded values, as renderers of MTL take the scalar.
+        let luminance = |&[r, g, b]: &[u8; 3]| {
+            ((54 * u32::from(r) + 183 * u32::from(g) + 19 * u32::from(b) + 128) >> 8) as u8
+        };
+        mask.pixels.as_chunks::<3>().0.iter().map(luminance).collect()
+    };
+    let opacity = match image::GrayImage::from_raw(mask.width, mask.height, opacity) {
+        Some(image) if (mask.width, mask.height) != (width, height) => {
+            image::imageops::resize(&image, width, height, image::imageops::FilterType::Triangle)
+                .into_raw()
+        }
+        Some(image) => image.into_raw(),
+        None => return image,
+    };
+    if opacity.iter().all(|alpha| *alpha == 255) {
+        return image;
+    }
+    let texels = image.pixels.chunks_exact(usize::from(image.channels));
+    let pixels =
+        texels.zip(opacity).flat_map(|(texel, a)| [texel[0], texel[1], texel[2], a]).collect();
+    DecodedTexture { width, height, channels: 4, pixels }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{ImageFormat, Rgba, RgbaImage};
+
+    fn embedded(bytes: Vec<u8>) -> TextureSource {
+        TextureSource {
+            name: "facade".into(),
+            data: TextureData::Embedded(bytes.into()),
+            opacity: None,
+        }
+    }
+
+    fn encoded(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        image.write_to(&mut bytes, format).unwrap();
+        bytes.into_inner()
+    }
+
+    fn two_texels(alpha: u8) -> DynamicImage {
+        RgbaImage::from_fn(2, 1, |x, _| Rgba([x as u8 * 200, 100, 50, alpha])).into()
+    }
+
+    #[test]
+    fn alpha_is_kept_only_where_it_says_something() {
+        let opaque = embedded(encoded(&two_texels(255), ImageFormat::Png));
+        let image = decode_texture(&opaque).unwrap();
+        assert_eq!((image.width, image.height, image.channels), (2, 1, 3));
+        assert_eq!(image.pixels, [0, 100, 50, 200, 100, 50]);
+        assert_eq!(texture_size(&opaque).unwrap(), (2, 1));
+        let image = decode_texture(&embedded(encoded(&two_texels(7), ImageFormat::Png))).unwrap();
+        assert_eq!(image.pixels, [0, 100, 50, 7, 200, 100, 50, 7]);
+    }
+
+    #[test]
+    fn deep_and_grey_images_become_8_bit_rgb() {
+        let deep =
+            DynamicImage::ImageLuma16(image::ImageBuffer::from_raw(1, 1, vec![0x8080]).unwrap());
+        let image = decode_texture(&embedded(encoded(&deep, ImageFormat::Png))).unwrap();
+        assert_eq!((image.channels, image.pixels), (3, vec![0x80; 3]));
+    }
+
+    #[test]
+    fn jpegs_are_decoded_in_colour_and_grey() {
+        for image in [
+            DynamicImage::from(image::RgbImage::from_pixel(9, 5, image::Rgb([200, 30, 90]))),
+            DynamicImage::from(image::GrayImage::from_pixel(9, 5, image::Luma([77]))),
+        ] {
+            let source = embedded(encoded(&image, ImageFormat::Jpeg));
+            let decoded = decode_texture(&source).unwrap();
+            assert_eq!((decoded.width, decoded.height, decoded.channels), (9, 5, 3));
+            assert_eq!(texture_size(&source).unwrap(), (9, 5));
+            let expected = image.to_rgb8().into_raw();
+            let far = decoded.pixels.iter().zip(&expected).any(|(a, b)| a.abs_diff(*b) > 3);
+            assert!(!far, "{:?}", &decoded.pixels[..3]);
+        }
+    }
+
+    #[test]
+    fn opacity_files_of_another_size_are_resampled() {
+        let folder = tempfile::tempdir().unwrap();
+        let mask = folder.path().join("mask.png");
+        DynamicImage::from(image::GrayImage::from_fn(4, 2, |x, _| {
+            image::Luma([if x < 2 { 0 } else { 255 }])
+        }))
+        .save(&mask)
+        .unwrap();
+        let mut source = embedded(encoded(&two_texels(255), ImageFormat::Png));
+        source.opacity = Some(mask);
+        let image = decode_texture(&source).unwrap();
+        assert_eq!(image.channels, 4);
+        assert!(image.pixels[3] < 64 && image.pixels[7] > 192, "{:?}", image.pixels);
+    }
+
+    #[test]
+    fn what_is_no_image_is_refused_with_its_name() {
+        let jpeg = encoded(&two_texels(255).to_rgb8().into(), ImageFormat::Jpeg);
+        let png = encoded(&two_texels(9), ImageFormat::Png);
+        for bytes in [b"text".to_vec(), Vec::new(), jpeg[..3].to_vec(), png[..20].to_vec()] {
+            let error = decode_texture(&embedded(bytes)).unwrap_err();
+            assert_eq!(error.exit_code(), 3);
+            assert!(error.to_string().contains("facade"), "{error}");
+        }
+    }
+
+    #[test]
+    fn every_truncation_gives_an_image_or_an_error() {
+        let jpeg = encoded(&two_texels(255).to_rgb8().into(), ImageFormat::Jpeg);
+        let png = encoded(&two_texels(9), ImageFormat::Png);
+        for bytes in [jpeg, png] {
+            for length in 0..bytes.len() {
+                let source = embedded(bytes[..length].to_vec());
+                let _ = decode_texture(&source);
+                let _ = texture_size(&source);
+            }
+        }
+    }
+
+    #[test]
+    fn giant_images_are_refused_by_their_header() {
+        let mut png = encoded(&two_texels(255), ImageFormat::Png);
+        png[16..20].copy_from_slice(&40_000_u32.to_be_bytes());
+        let crc = crc32fast::hash(&png[12..29]);
+        png[29..33].copy_from_slice(&crc.to_be_bytes());
+        let error = decode_texture(&embedded(png)).unwrap_err().to_string();
+        assert!(error.contains("40000 x 1"), "{error}");
+    }
+}
