@@ -232,8 +232,9 @@ fn size_failure(bytes: &[u8], size: [u32; 2]) -> Option<String> {
     }
 }
 
-/// A skirt that stands for several spans of a border reaches no more than so many times as far from
-/// the source as the border.
+/// A skirt over several spans of a border may be so many times as high as the border is far from its
+/// polyline, which is the builder's own bound (`builder::border::skirt`): more triangles would keep
+/// closer.
 const SKIRT_REACH: f64 = 2.5;
 
 /// Nodes that stick out of their parent's box, and errors that grow towards the leaves.

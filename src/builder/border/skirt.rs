@@ -25,6 +25,7 @@ use crate::builder::border::cover::{Cover, deviation};
 use crate::builder::border::span::{BorderSpan, edges_of};
 use crate::builder::border::thin::EdgeKey;
 use crate::builder::border::vertex::{Border, Path};
+use crate::lattice::Lattice;
 use crate::mesh::{Mesh, wide};
 use crate::texture::AppendedSkirts;
 
@@ -41,7 +42,31 @@ pub struct Skirt {
 
 /// A polyline that is no farther from its edge than this many lattice steps needs no skirt: two sides
 /// that both leave theirs out are apart by rounding alone.
-pub const CLOSED_STEPS: f64 = 1.5;
+const CLOSED_STEPS: f64 = 1.5;
+
+/// A polyline of lattice points along its edge is computed to be no farther from it than this.
+const COMPUTED_STEPS: f64 = 1e-6;
+
+/// What rounding to the lattice asks of skirts.
+#[derive(Clone, Copy, Debug)]
+pub struct SkirtRounding {
+    /// Skirts reach beyond what they cover by some of these, metres.
+    pub step: f64,
+    /// What is open by no more than this needs no skirt, metres.
+    pub closed: f64,
+}
+
+impl SkirtRounding {
+    /// Of a block's lattice; `quantized` where corners are rounded to it and it shows.
+    pub fn of(lattice: &Lattice, quantized: bool) -> Self {
+        match quantized {
+            // What is open by a step of a coarse lattice is seen, and its corners are rounded to
+            // the nearest, which takes half the margin.
+            true => Self { step: 0.5 * lattice.step, closed: COMPUTED_STEPS * lattice.step },
+            false => Self { step: lattice.step, closed: CLOSED_STEPS * lattice.step },
+        }
+    }
+}
 
 /// One skirt may stand for this many spans.
 const MOST_SPANS: usize = 16;
@@ -54,17 +79,15 @@ const SHARED_HEIGHT: f64 = 8.0;
 /// both sides: no skirt is much farther from the source than the node's border is.
 const SHARED_HEIGHT_MOST: f64 = 2.5;
 
-/// The skirts that a node needs whose border on `path` is made of `runs`. `step` is the lattice step
-/// in metres; what is open by no more than `closed` metres has none.
+/// The skirts that a node needs whose border on `path` is made of `spans`.
 pub fn skirts(
     mesh: &Mesh,
     border: &Border,
-    runs: &[BorderSpan],
+    spans: &[BorderSpan],
     path: &Path,
-    step: f64,
-    closed: f64,
+    SkirtRounding { step, closed }: SkirtRounding,
 ) -> Vec<Skirt> {
-    let far: Vec<f64> = runs.iter().map(|run| deviation(run.points(path))).collect();
+    let far: Vec<f64> = spans.iter().map(|span| deviation(span.points(path))).collect();
     let open: Vec<bool> = far.iter().map(|&far| far > closed).collect();
     let of_open = || far.iter().zip(&open).filter(|(_, open)| **open).map(|(far, _)| *far);
     let count = of_open().count();
@@ -73,25 +96,26 @@ pub fn skirts(
     }
     let (mean, most) = (of_open().sum::<f64>() / count as f64, of_open().fold(0.0, f64::max));
     let height = (SHARED_HEIGHT * mean).min(SHARED_HEIGHT_MOST * most);
-    let edges = edges_of(runs, path, mesh, border);
-    let in_plane = |run: &BorderSpan| {
-        let (plane, points) = (path.plane(run.plane()), run.points(path));
+    let edges = edges_of(spans, path, mesh, border);
+    let in_plane = |span: &BorderSpan| {
+        let (plane, points) = (path.plane(span.plane()), span.points(path));
         [points[0], points[points.len() - 1]].iter().all(|end| end[plane.axis] == plane.coordinate)
     };
     let mut skirts = Vec::new();
     let mut first = 0;
-    while first < runs.len() {
-        let goes_on =
-            |&at: &usize| at < runs.len() && runs[at].follows(&runs[at - 1]) && in_plane(&runs[at]);
+    while first < spans.len() {
+        let goes_on = |&at: &usize| {
+            at < spans.len() && spans[at].follows(&spans[at - 1]) && in_plane(&spans[at])
+        };
         let mut end = first + 1;
-        if in_plane(&runs[first]) {
+        if in_plane(&spans[first]) {
             end += (end..).take_while(goes_on).count();
-            for (part, cover) in parts(&runs[first..end], &open[first..end], path, height, step) {
-                let edge = model_edge(&runs[first..end][part], path, &edges, mesh);
+            for (part, cover) in parts(&spans[first..end], &open[first..end], path, height, step) {
+                let edge = model_edge(&spans[first..end][part], path, &edges, mesh);
                 skirts.extend(edge.map(|(edge, _)| Skirt::over(edge, &cover)));
             }
         } else if open[first] {
-            skirts.extend(beside_plane(&runs[first], path, &edges, mesh, step));
+            skirts.extend(beside_plane(&spans[first], path, &edges, mesh, step));
         }
         first = end;
     }
@@ -100,16 +124,16 @@ pub fn skirts(
 
 /// The skirt of one span with an end beside its plane.
 fn beside_plane(
-    run: &BorderSpan,
+    span: &BorderSpan,
     path: &Path,
     edges: &FxHashMap<EdgeKey, [u32; 2]>,
     mesh: &Mesh,
     step: f64,
 ) -> Option<Skirt> {
-    let plane = path.plane(run.plane());
-    let points = run.points(path);
+    let plane = path.plane(span.plane());
+    let points = span.points(path);
     let region = Region { points, axis: plane.axis, coordinate: plane.coordinate };
-    let (edge, is_own) = model_edge(std::slice::from_ref(run), path, edges, mesh)?;
+    let (edge, is_own) = model_edge(std::slice::from_ref(span), path, edges, mesh)?;
     Some(match is_own {
         true => Skirt::new(edge, region, mesh.positions[edge[0] as usize], step),
         false => Skirt::alone(edge, region, step),
@@ -132,15 +156,15 @@ struct Division {
 /// higher than `height` over several, with as few triangles as can be. Parts that need none are left
 /// out.
 fn parts(
-    runs: &[BorderSpan],
+    spans: &[BorderSpan],
     open: &[bool],
     path: &Path,
     height: f64,
     step: f64,
 ) -> Vec<(Range<usize>, Cover)> {
-    let axis = path.plane(runs[0].plane()).axis;
+    let axis = path.plane(spans[0].plane()).axis;
     let mut best = vec![Division::default()];
-    for end in 1..=runs.len() {
+    for end in 1..=spans.len() {
         let extended = |start: usize, cover: Option<Cover>| Division {
             triangles: best[start].triangles + cover.as_ref().map_or(0, Cover::triangles),
             heights: best[start].heights + cover.as_ref().map_or(0.0, |cover| cover.height),
@@ -148,7 +172,7 @@ fn parts(
             cover,
         };
         let covered =
-            |start: usize| Cover::of(runs[start].points_to(&runs[end - 1], path), axis, step);
+            |start: usize| Cover::of(spans[start].points_to(&spans[end - 1], path), axis, step);
         let alone = end - 1;
         let mut least = extended(alone, open[alone].then(|| covered(alone)).flatten());
         for start in (end.saturating_sub(MOST_SPANS)..alone).rev() {
@@ -163,7 +187,7 @@ fn parts(
         best.push(least);
     }
     let mut parts = Vec::new();
-    let mut end = runs.len();
+    let mut end = spans.len();
     while end > 0 {
         let Division { start, cover, .. } = std::mem::take(&mut best[end]);
         parts.extend(cover.map(|cover| (start..end, cover)));
@@ -177,23 +201,23 @@ fn parts(
 /// ends in the order of the span; where none has, the nearest of the mesh. And whether it is an edge
 /// of the spans.
 fn model_edge(
-    runs: &[BorderSpan],
+    spans: &[BorderSpan],
     path: &Path,
     edges: &FxHashMap<EdgeKey, [u32; 2]>,
     mesh: &Mesh,
 ) -> Option<([u32; 2], bool)> {
-    let middle = runs.len() / 2;
-    let outwards = (0..runs.len()).map(|at| match at % 2 {
-        0 => (middle + at / 2) % runs.len(),
-        _ => (middle + runs.len() - at.div_ceil(2)) % runs.len(),
+    let middle = spans.len() / 2;
+    let outwards = (0..spans.len()).map(|at| match at % 2 {
+        0 => (middle + at / 2) % spans.len(),
+        _ => (middle + spans.len() - at.div_ceil(2)) % spans.len(),
     });
     for at in outwards {
-        if let Some(&[a, b]) = edges.get(&runs[at].edge(path)) {
-            let forwards = mesh.positions[a as usize] == runs[at].points(path)[0];
+        if let Some(&[a, b]) = edges.get(&spans[at].edge(path)) {
+            let forwards = mesh.positions[a as usize] == spans[at].points(path)[0];
             return Some((if forwards { [a, b] } else { [b, a] }, true));
         }
     }
-    Some((nearest_edge(mesh, runs[middle].points(path)[0])?, false))
+    Some((nearest_edge(mesh, spans[middle].points(path)[0])?, false))
 }
 
 /// An edge of the triangle corner nearest to a place; the first of equals.
@@ -250,10 +274,10 @@ impl Skirt {
         self.corners.len() as u8 + 1
     }
 
-    /// Covers what leads from ends of the run that lie beside the plane to their neighbours, and
-    /// takes such ends away from the run.
+    /// Covers what leads from ends of the span that lie beside the plane to their neighbours, and
+    /// takes such ends away from the span.
     fn close_ends(&mut self, region: &mut Region, ends: [u8; 2]) {
-        // The chord over what is left of the run.
+        // The chord over what is left of the span.
         let mut chord = ends;
         for end in 0..2 {
             let points = region.points;
@@ -337,8 +361,8 @@ mod tests {
 
     /// The skirt of the edge from the first to the last of some points, for the plane x = 0.
     fn over(points: &[[f32; 3]]) -> Skirt {
-        let run = Region { points, axis: 0, coordinate: 0.0 };
-        Skirt::new([7, 8], run, points[0], 1e-6)
+        let span = Region { points, axis: 0, coordinate: 0.0 };
+        Skirt::new([7, 8], span, points[0], 1e-6)
     }
 
     #[test]
@@ -359,7 +383,7 @@ mod tests {
 
     /// A polyline in the plane x = 0 of which every `each`-th vertex is kept, as a mesh whose border
     /// it is, each edge with a triangle behind it; and its skirts.
-    fn of_border(heights: &[f32], each: usize) -> (Vec<[f32; 3]>, Vec<Skirt>) {
+    fn of_border(heights: &[f32], each: usize, quantized: bool) -> (Vec<[f32; 3]>, Vec<Skirt>) {
         let positions: Vec<[f32; 3]> =
             (0..).zip(heights).map(|(y, &z)| [0.0, y as f32, z]).collect();
         let keep = (0..positions.len()).map(|at| if at % each == 0 { 0 } else { 9 }).collect();
@@ -375,27 +399,38 @@ mod tests {
         mesh.materials = vec![0; count + 1];
         let mut border = Border::interior(count + 1);
         border.planes[..count].fill(1);
-        let runs = original_spans(&mesh, &border, &path);
+        let spans = original_spans(&mesh, &border, &path);
         mesh.triangles = fan(each);
-        let runs = join_spans(runs, &path, 3, &mesh, &border);
-        assert_eq!(runs.len(), (count - 1) / each);
-        (positions, skirts(&mesh, &border, &runs, &path, 1e-5, CLOSED_STEPS * 1e-5))
+        let spans = join_spans(spans, &path, 3, &mesh, &border);
+        assert_eq!(spans.len(), (count - 1) / each);
+        let lattice = Lattice { step: 1e-5 };
+        let rounding = SkirtRounding::of(&lattice, quantized);
+        (positions, skirts(&mesh, &border, &spans, &path, rounding))
     }
 
     #[test]
     fn nothing_covers_what_is_open_by_rounding_alone() {
-        assert!(of_border(&[0.0; 33], 4).1.is_empty());
+        assert!(of_border(&[0.0; 33], 4, false).1.is_empty());
         let mut heights = [0.0; 33];
         heights[6] = 1.4e-5;
-        assert!(of_border(&heights, 4).1.is_empty());
+        assert!(of_border(&heights, 4, false).1.is_empty());
         heights[6] = 0.01;
-        assert_eq!(triangles_of(&of_border(&heights, 4).1), 1);
+        assert_eq!(triangles_of(&of_border(&heights, 4, false).1), 1);
+    }
+
+    #[test]
+    fn a_step_of_a_lattice_that_shows_is_covered_and_nothing_less() {
+        let mut heights = [0.0; 33];
+        assert!(of_border(&heights, 4, true).1.is_empty());
+        heights[6] = 1e-5;
+        assert_eq!(triangles_of(&of_border(&heights, 4, true).1), 1);
+        assert!(of_border(&heights, 4, false).1.is_empty());
     }
 
     #[test]
     fn spans_of_like_height_share_a_skirt_and_all_are_covered() {
         let zigzag: Vec<f32> = (0..65).map(|at| [0.0, 0.3, -0.3, 0.2][at % 4]).collect();
-        let (points, shared) = of_border(&zigzag, 4);
+        let (points, shared) = of_border(&zigzag, 4, false);
         assert_eq!(triangles_of(&shared), 2, "16 spans");
         for &[_, y, z] in &points {
             let covered = shared.iter().any(|skirt| {
@@ -410,20 +445,20 @@ mod tests {
         // A hill that spans climb and descend is no reason for a skirt as high as it is.
         let hill: Vec<f32> =
             (0..65).map(|at| zigzag[at] + 20.0 - (at as f32 - 32.0).abs()).collect();
-        let (_, shared) = of_border(&hill, 4);
+        let (_, shared) = of_border(&hill, 4, false);
         assert!(shared.len() > 1);
         // Neither is one spike.
         let mut spike = vec![0.0; 65];
         spike[30] = 5.0;
-        let (_, alone) = of_border(&spike, 4);
+        let (_, alone) = of_border(&spike, 4, false);
         assert_eq!((alone.len(), triangles_of(&alone)), (1, 1));
     }
 
     #[test]
     fn a_skirt_without_an_edge_has_all_its_corners() {
         let points = [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 2.0, 1.0], [0.0, 3.0, 0.0]];
-        let run = || Region { points: &points, axis: 0, coordinate: 0.0 };
-        let (hung, alone) = (over(&points), Skirt::alone([3, 4], run(), 1e-6));
+        let span = || Region { points: &points, axis: 0, coordinate: 0.0 };
+        let (hung, alone) = (over(&points), Skirt::alone([3, 4], span(), 1e-6));
         assert_eq!(alone.edge, [3, 4]);
         let places = |skirt: &Skirt| -> Vec<[[f32; 3]; 3]> {
             let place = |corner: u8| match corner {

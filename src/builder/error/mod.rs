@@ -120,15 +120,5 @@ fn statistics(a: &Original, b: &Original, bound: f64) -> (f64, f64, f64) {
     (mean, rms, p95)
 }
 
-/// A bound on the two-sided distance between two meshes over the same surface, metres.
-pub fn hausdorff(source: &Mesh, simplified: &Mesh) -> f64 {
-    surface_error(&Original::of(source), simplified).bound
-}
-
-/// [`hausdorff`]; the effort is found as it is needed.
-pub fn hausdorff_with(source: &Mesh, simplified: &Mesh, _effort: usize) -> f64 {
-    hausdorff(source, simplified)
-}
-
 #[cfg(test)]
 mod tests;

@@ -5,8 +5,14 @@ use glam::Vec3;
 use super::bvh::Bvh;
 use super::original::Original;
 
-/// Points of each surface.
-pub(super) const POINTS: usize = 512;
+/// Points of a surface: so many for each triangle, within limits. Fewer leave means of small
+/// surfaces to chance; more of large ones only cost time.
+const POINTS_PER_TRIANGLE: usize = 2;
+const POINTS: std::ops::RangeInclusive<usize> = 64..=512;
+
+fn points_of(triangles: usize) -> usize {
+    (triangles * POINTS_PER_TRIANGLE).clamp(*POINTS.start(), *POINTS.end())
+}
 
 /// Points of one mesh, each for as much area as any other, in the order of the leaves of its
 /// tree: neighbours in the list are neighbours in space.
@@ -23,15 +29,16 @@ impl Samples {
             leaves.flat_map(|(leaf, &count)| (0..usize::from(count)).map(|lane| leaf.lane(lane)))
         };
         let area: f64 = lanes().map(|triangle| triangle.area()).sum();
-        let step = area / POINTS as f64;
-        let mut points = Vec::with_capacity(POINTS + 1);
+        let count = points_of(lanes().count());
+        let step = area / count as f64;
+        let mut points = Vec::with_capacity(count + 1);
         if !(step > 0.0 && step.is_finite()) {
             return Self { points, area: 0.0 };
         }
         let mut passed = 0.0;
         for triangle in lanes() {
             passed += triangle.area();
-            while (points.len() as f64 + 0.5) * step < passed && points.len() < POINTS {
+            while (points.len() as f64 + 0.5) * step < passed && points.len() < count {
                 let [u, v] = spread(points.len());
                 let [a, b, c] = triangle.corners();
                 points.push(a + (b - a) * u + (c - a) * v);
@@ -42,22 +49,22 @@ impl Samples {
 }
 
 impl Original {
-    /// At most [`POINTS`] points, from each part as many as its area asks for; none where there is
-    /// no area.
+    /// Points from each part, as many as its area asks for; none where there is no area.
     pub(super) fn samples(&self) -> Vec<Vec3> {
         let area: f64 = self.parts.iter().map(|part| part.samples.area).sum();
-        let step = area / POINTS as f64;
+        let count = points_of(self.triangle_count());
+        let step = area / count as f64;
         if !(step > 0.0 && step.is_finite()) {
             return Vec::new();
         }
-        let mut chosen = Vec::with_capacity(POINTS);
+        let mut chosen = Vec::with_capacity(count);
         let mut passed = 0.0;
         for samples in self.parts.iter().map(|part| &part.samples) {
             let begin = passed;
             passed += samples.area;
             loop {
                 let at = (chosen.len() as f64 + 0.5) * step;
-                if at >= passed || chosen.len() == POINTS || samples.points.is_empty() {
+                if at >= passed || chosen.len() == count || samples.points.is_empty() {
                     break;
                 }
                 let index = (at - begin) / samples.area * samples.points.len() as f64;
@@ -89,9 +96,10 @@ mod tests {
             &[[0, 1, 2], [2, 3, 4], [0, 1, 0]],
         );
         let points = Original::of(&mesh).samples();
-        assert!(points.len().abs_diff(POINTS) <= 1);
+        let count = points_of(3);
+        assert!(points.len().abs_diff(count) <= 1);
         let of_first = points.iter().filter(|p| p.x / 6.0 + p.y <= 1.0 + 1e-6).count();
-        assert!(of_first.abs_diff(POINTS * 6 / 7) <= 1, "{of_first}");
+        assert!(of_first.abs_diff(count * 6 / 7) <= 1, "{of_first}");
         // As many in the half beside the corner as its area is: an eighth beside each.
         let near = points.iter().filter(|p| p.x / 6.0 + p.y < 0.5).count();
         assert!(near.abs_diff(of_first / 4) <= 4, "{near} of {of_first}");

@@ -6,7 +6,7 @@ use super::BlockBuilder;
 use super::node::{NodeDraft, NodeSink};
 use crate::Result;
 use crate::builder::border::cap::cap_sections;
-use crate::builder::border::skirt::{CLOSED_STEPS, Skirt, skirts, triangles_of};
+use crate::builder::border::skirt::{Skirt, SkirtRounding, skirts, triangles_of};
 use crate::builder::border::span::{BorderSpan, join_spans};
 use crate::builder::border::thin::thin_border;
 use crate::builder::border::vertex::{Border, Path};
@@ -123,18 +123,13 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         keep_folds: bool,
     ) -> Coarse {
         let &CoarseNode { path, resolution, budget, .. } = node;
-        // Skirts have a margin of two steps; one is enough where corners are rounded to the nearest.
-        let skirt_step = self.lattice.step * if self.quantization.is_some() { 0.5 } else { 1.0 };
-        // A coarse lattice shows: what is open by a step of it is open.
-        let closed =
-            if self.quantization.is_some() { 0.0 } else { CLOSED_STEPS * self.lattice.step };
+        let rounding = SkirtRounding::of(&self.lattice, self.quantization.is_some());
         let at = resolution as u8;
         let mut mesh = source.clone();
         thin_border(&mut mesh, &mut border, path, at);
         // Skirts count towards the budget, but may not take more than half of it.
         let spans = join_spans(spans, path, at, &mesh, &border);
-        let skirt_triangles =
-            triangles_of(&skirts(&mesh, &border, &spans, path, skirt_step, closed));
+        let skirt_triangles = triangles_of(&skirts(&mesh, &border, &spans, path, rounding));
         let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
         let weights = AppearanceWeights { keep_folds, ..self.options.weights };
         let method = Method {
@@ -151,7 +146,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             result = fallback_triangles(source, &border, FALLBACK_TRIANGLES.min(target));
         }
         cap_sections(&mut result, &spans, path, &mesh, &border);
-        let mut skirts = skirts(&result.mesh, &result.border, &spans, path, skirt_step, closed);
+        let mut skirts = skirts(&result.mesh, &result.border, &spans, path, rounding);
         if self.quantization.is_some() {
             for (position, _) in skirts.iter_mut().flat_map(|skirt| &mut skirt.corners) {
                 *position = self.lattice.nearest(*position);

@@ -19,7 +19,7 @@ pub use self::options::{BorderMode, HierarchyOptions, SimplifyFrom, TreeShape};
 pub use self::shape::Resolutions;
 
 use self::coarse::{CoarseNode, NodeSurface};
-use self::shape::NodePlan;
+use self::shape::{NodePlan, Parent};
 use crate::Result;
 use crate::builder::border::span::original_spans;
 use crate::builder::border::vertex::Border;
@@ -91,7 +91,8 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let node = CoarseNode { path: &path, resolution, child_path, budget };
         let mesh = chunk.mesh.clone();
         let (border, moved) = (chunk.border.clone(), self.moved(&chunk));
-        let parallel = mesh.triangles.len() > PARALLEL * self.options.desired_tris as usize;
+        let parent = Parent { resolution, triangles: mesh.triangles.len() };
+        let parallel = parent.triangles > PARALLEL * self.options.desired_tris as usize;
         let chunks = self.stages.time(Stage::Cut, || self.divide(chunk, resolution));
         // What no plane divides would not be divided by the next ones either.
         let divided = chunks.len() > 1 || self.options.tree == TreeShape::Thesis;
@@ -99,7 +100,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             .into_iter()
             .map(|chunk| {
                 let triangles = chunk.mesh.triangles.len();
-                let plan = self.resolutions.child(triangles, resolution, chunk.path.len());
+                let plan = self.resolutions.child(triangles, chunk.path.len(), parent);
                 (chunk, if divided { plan } else { NodePlan::Leaf })
             })
             .collect();

@@ -16,6 +16,11 @@ use super::options::{HierarchyOptions, TreeShape};
 /// cuts are not perfectly even, and another level for a few triangles more would be of tiny nodes.
 const LAST_STEP_TOLERANCE: f64 = 2.0;
 
+/// Cutting a chunk that is at the last resolution but one again pays where the pieces of a node
+/// shrink by at least this power of their number. Pieces of a surface shrink by its first power,
+/// those of triangles that reach all through a volume by its cube root: these would be cut for ever.
+const SHRINKING: f64 = 0.5;
+
 /// A tree is not cut deeper than this many planes ([`crate::builder::border::vertex::PlaneSet`]
 /// holds 64, and each child is behind at most 6 more).
 const MOST_PLANES: usize = 58;
@@ -42,6 +47,15 @@ pub enum NodePlan {
         /// The triangles that it may have.
         budget: usize,
     },
+}
+
+/// A node that is divided.
+#[derive(Clone, Copy, Debug)]
+pub struct Parent {
+    /// Its resolution.
+    pub resolution: usize,
+    /// The source triangles of its chunk.
+    pub triangles: usize,
 }
 
 impl Resolutions {
@@ -79,10 +93,9 @@ impl Resolutions {
         if self.last() == 0 { NodePlan::Leaf } else { self.coarse(triangles, 0) }
     }
 
-    /// What becomes of a chunk of so many triangles below a node at `parent`, behind so many
-    /// planes.
-    pub fn child(&self, triangles: usize, parent: usize, planes: usize) -> NodePlan {
-        let next = parent + 1;
+    /// What becomes of a chunk of so many triangles, behind so many planes, below a node.
+    pub fn child(&self, triangles: usize, planes: usize, parent: Parent) -> NodePlan {
+        let next = parent.resolution + 1;
         if self.tree == TreeShape::Thesis {
             let deep = next == self.last() || planes > MOST_PLANES;
             return if deep { NodePlan::Leaf } else { self.coarse(triangles, next) };
@@ -93,7 +106,9 @@ impl Resolutions {
         }
         if next >= self.last() {
             let most = LAST_STEP_TOLERANCE * self.level_factor.sqrt();
-            return if ratio < most { NodePlan::Leaf } else { self.coarse(triangles, parent) };
+            let shrunk = parent.triangles as f64 / libm::pow(self.level_factor, SHRINKING);
+            let leaf = ratio < most || triangles as f64 > shrunk;
+            return if leaf { NodePlan::Leaf } else { self.coarse(triangles, parent.resolution) };
         }
         // The coarsest resolution that gives the node about the triangles that are desired.
         let nearest = (next..self.last()).min_by(|&a, &b| {
@@ -176,14 +191,34 @@ mod tests {
         let all = resolutions(900 * 256, TreeShape::Balanced);
         assert_eq!(all.factors.len(), 5);
         let coarse = |resolution, budget| NodePlan::Coarse { resolution, budget };
+        let below = |resolution| Parent { resolution, triangles: 900 * 256 >> (2 * resolution) };
         assert_eq!(all.root(900 * 256), coarse(0, 900));
-        assert_eq!(all.child(900 * 64, 0, 2), coarse(1, 900));
-        assert_eq!(all.child(900 * 4, 0, 2), coarse(3, 900));
+        assert_eq!(all.child(900 * 64, 2, below(0)), coarse(1, 900));
+        assert_eq!(all.child(900 * 4, 2, below(0)), coarse(3, 900));
         for parent in 0..3 {
-            assert_eq!(all.child(1700, parent, 2), NodePlan::Leaf);
+            assert_eq!(all.child(1700, 2, below(parent)), NodePlan::Leaf);
         }
-        assert_eq!(all.child(3500, 3, 8), NodePlan::Leaf, "a little more than it should have");
-        assert_eq!(all.child(3700, 3, 8), coarse(3, 925));
-        assert_eq!(all.child(900 * 64, 0, 60), NodePlan::Leaf, "no plane is left");
+        let large = Parent { resolution: 3, triangles: 900 * 16 };
+        assert_eq!(all.child(3500, 8, large), NodePlan::Leaf, "a little more than it should have");
+        assert_eq!(all.child(3700, 8, large), coarse(3, 925));
+        assert_eq!(all.child(900 * 64, 60, below(0)), NodePlan::Leaf, "no plane is left");
+    }
+
+    /// Triangles that reach all through a volume: an eighth of its side has 1/4 of them.
+    #[test]
+    fn what_cuts_do_not_divide_is_not_cut_for_ever() {
+        let all = resolutions(900 * 4, TreeShape::Balanced);
+        let mut triangles = 900 * 40;
+        let mut resolution = 0;
+        let mut depth = 0;
+        while let NodePlan::Coarse { resolution: at, .. } = all.child(
+            (triangles as f64 / 4f64.cbrt()) as usize,
+            depth,
+            Parent { resolution, triangles },
+        ) {
+            triangles = (triangles as f64 / 4f64.cbrt()) as usize;
+            (resolution, depth) = (at, depth + 1);
+        }
+        assert!(depth <= 1, "{depth}");
     }
 }
