@@ -1,5 +1,6 @@
 //! Check: the stored error of a node holds, so is not below the measured one, and is tight, so not
-//! far above it.
+//! far above the largest of its own and those of the nodes below it: stored errors never grow
+//! towards the leaves, since viewers refine by them.
 
 use std::collections::BTreeMap;
 
@@ -7,6 +8,7 @@ use super::faithful::rounding;
 use super::node_errors::NodeError;
 use super::options::Limits;
 use super::report::{Check, ErrorFigures};
+use super::tree::line;
 use crate::format::Scene;
 use crate::lattice::Quantization;
 
@@ -25,6 +27,13 @@ pub(super) fn errors(
     let mut check = Check::new("stored errors");
     let mut ratios: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
     let lattice = Quantization::of(&scene.parameters);
+    let mut largest: BTreeMap<u32, f64> = BTreeMap::new();
+    for measured in nodes {
+        for node in line(scene, measured.node) {
+            let largest = largest.entry(node).or_default();
+            *largest = largest.max(measured.max());
+        }
+    }
     let mut too_small: Vec<(f64, String, String)> = Vec::new();
     let mut count_too_small: BTreeMap<u32, u64> = BTreeMap::new();
     for measured in nodes {
@@ -35,7 +44,11 @@ pub(super) fn errors(
         // both; it cannot be seen between them.
         let moved = lattice.map_or(0.0, |lattice| 2.0 * lattice.bound());
         let least = rounding.max(moved);
-        ratios.entry(node.level).or_default().push((stored - moved).max(least) / max.max(least));
+        let largest = largest.get(&measured.node).copied().unwrap_or(max);
+        ratios
+            .entry(node.level)
+            .or_default()
+            .push((stored - moved).max(least) / largest.max(least));
         if stored + rounding < max {
             *count_too_small.entry(node.level).or_default() += 1;
             let (position, from, to) = if measured.to_node.0 >= measured.to_original.0 {

@@ -258,12 +258,15 @@ fn check_budgets(
                 .iter()
                 .map(|&leaf| u64::from(built.scene.nodes[leaf].triangles))
                 .sum();
-            // A node that is not at the last step but one has about the triangles that are desired;
-            // one that is has at most twice what rounding the number of steps gives.
+            // A root has the triangles that are desired. Below it a step of simplification divides
+            // by the root of the level factor at least, which is what rounding the number of steps
+            // leaves of it.
             let hierarchy = &options.hierarchy;
-            let desired = f64::from(hierarchy.desired_tris);
-            let budget = 2.0 * f64::from(hierarchy.level_factor).sqrt() * desired;
-            let most = (below as f64).min(budget).max(8.0);
+            let budget = match index == root as usize {
+                true => f64::from(hierarchy.desired_tris),
+                false => below as f64 / f64::from(hierarchy.level_factor).sqrt(),
+            };
+            let most = budget.max(8.0);
             assert!(
                 f64::from(node.triangles) <= (most * 1.1).ceil() + 1.0,
                 "{what}: {} has {} triangles, at most {most} are in its budget, and no reason",

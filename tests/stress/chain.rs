@@ -78,18 +78,6 @@ impl Chain {
         failed.map(|check| format!("{}: {:?}", check.name, check.failures.first())).collect()
     }
 
-    /// The same without those that say that a bound is loose: it holds all the same.
-    pub fn failures_but_loose_bounds(&self) -> Vec<String> {
-        let loose = |what: &str| what.contains("times the measured ones");
-        let failed = self.report.checks.iter().filter(|check| !check.passed);
-        failed
-            .filter_map(|check| {
-                let first = check.failures.iter().find(|failure| !loose(&failure.what))?;
-                Some(format!("{}: {first:?}", check.name))
-            })
-            .collect()
-    }
-
     /// The figures over a path of its own.
     pub fn own_figures(&self) -> Figures {
         self.figures(&self.path(), 1.0)

@@ -69,10 +69,15 @@ impl Shape {
     }
 
     /// Moved by less than what coordinates are rounded by; 0 leaves it alone.
-    pub fn shaken(mut self, seed: u64) -> Self {
+    pub fn shaken(self, seed: u64) -> Self {
+        self.shaken_by(seed, 1.0)
+    }
+
+    /// Moved by so many times as much.
+    pub fn shaken_by(mut self, seed: u64, times: f64) -> Self {
         let mut random = Random::new(seed, 0);
         if seed > 0 {
-            self.positions.iter_mut().for_each(|p| *p += half_a_step(&mut random));
+            self.positions.iter_mut().for_each(|p| *p += half_a_step(&mut random) * times);
         }
         self
     }

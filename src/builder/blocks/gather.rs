@@ -123,7 +123,7 @@ fn halves(
     let Some((low, high)) = chunk.mesh.bounds().filter(|_| triangles > most) else {
         return vec![chunk];
     };
-    let region = Region { low, high, share: 0.5 };
+    let region = Region { low, high, share: 0.5, touching: 0.0 };
     let plane = stages.time(Stage::Gather, || best_plane(&chunk.mesh, &region));
     let Some((axis, middle)) = plane.filter(|_| chunk.path.len() < 12) else { return vec![chunk] };
     let middle = lattice.map_or(middle, |lattice| lattice.round(middle));

@@ -52,12 +52,29 @@ pub fn thin_border(mesh: &mut Mesh, border: &mut Border, path: &Path, level: u8)
     if candidates.is_empty() {
         return 0;
     }
-    // Two neighbours along the border, by vertex; more or fewer, or another vertex at the same
-    // place, and it stays.
+    let on_border = |vertex: usize| border.planes[vertex] & path.bits() != 0;
+    let mut is_gone: Vec<bool> = (0..mesh.positions.len()).map(|v| gone(border, v)).collect();
+    let edges = border_edges(mesh, border, path);
+    let stuck = collapse_along(mesh, &edges, on_border, &mut is_gone);
+    for vertex in candidates.into_iter().filter(|&vertex| !is_gone[vertex as usize]) {
+        border.keep[vertex as usize] = 0;
+    }
+    stuck
+}
+
+/// Collapses the vertices that are `gone` along edges onto the nearest that is not. Those that
+/// cannot be, since there is another vertex of the border at the same place or there are more or
+/// fewer than two edges, stay and are gone no longer; returns how many these are.
+pub(super) fn collapse_along(
+    mesh: &mut Mesh,
+    edges: &[[u32; 2]],
+    on_border: impl Fn(usize) -> bool,
+    gone: &mut [bool],
+) -> usize {
     let mut wedges: FxHashMap<PositionKey<f32>, u32> = FxHashMap::default();
     let mut on_seam = vec![false; mesh.positions.len()];
     for (vertex, &position) in mesh.positions.iter().enumerate() {
-        if border.planes[vertex] & path.bits() != 0
+        if on_border(vertex)
             && let Some(other) = wedges.insert(key(position), vertex as u32)
         {
             on_seam[vertex] = true;
@@ -65,7 +82,7 @@ pub fn thin_border(mesh: &mut Mesh, border: &mut Border, path: &Path, level: u8)
         }
     }
     let mut neighbours: FxHashMap<u32, ([u32; 2], u32)> = FxHashMap::default();
-    for [a, b] in border_edges(mesh, border, path) {
+    for &[a, b] in edges {
         for (from, to) in [(a, b), (b, a)] {
             let entry = neighbours.entry(from).or_insert(([u32::MAX; 2], 0));
             if let Some(slot) = entry.0.get_mut(entry.1 as usize) {
@@ -74,22 +91,24 @@ pub fn thin_border(mesh: &mut Mesh, border: &mut Border, path: &Path, level: u8)
             entry.1 += 1;
         }
     }
+    let candidates: Vec<u32> =
+        (0..mesh.positions.len() as u32).filter(|&vertex| gone[vertex as usize]).collect();
     let mut stuck = 0;
     for &vertex in &candidates {
         let two = neighbours.get(&vertex).is_some_and(|(_, count)| *count == 2);
         if !two || on_seam[vertex as usize] {
-            border.keep[vertex as usize] = 0;
+            gone[vertex as usize] = false;
             stuck += 1;
         }
     }
     let mut target: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-    for &vertex in &candidates {
-        if !gone(border, vertex as usize) {
+    for vertex in candidates {
+        if !gone[vertex as usize] {
             continue;
         }
         let ends = neighbours[&vertex]
             .0
-            .map(|first| walk(mesh, vertex, first, &neighbours, |v| gone(border, v as usize)));
+            .map(|first| walk(mesh, vertex, first, &neighbours, |v| gone[v as usize]));
         let nearest = match ends {
             [Some(a), Some(b)] => {
                 let nearer = a.1.total_cmp(&b.1).then_with(|| {

@@ -33,6 +33,9 @@ pub struct Region {
     pub high: [f64; 3],
     /// The share of the triangles that is to be below the plane, over 0 and under 1.
     pub share: f64,
+    /// Triangles that reach no farther beyond a plane are not crossed by it, metres: their vertices
+    /// will count as on it ([`crate::builder::cut::split::CutTolerance`]).
+    pub touching: f64,
 }
 
 /// The axis and the coordinate of the plane that is best to cut at within `region`; `None` where
@@ -40,9 +43,11 @@ pub struct Region {
 ///
 /// A plane costs the triangles that it crosses and as many as one through an even surface would,
 /// times what its unevenness adds; across a side that is shorter than the longest by a factor it
-/// costs more by the power 3/4 of that, since the border is longer.
+/// costs more by the power 3/4 of that, since the border is longer. Near the best of the places that
+/// are compared, the plane goes where it crosses the fewest: through the vertices of a row, if there
+/// are rows.
 pub fn best_plane<C: Coordinate>(mesh: &Mesh<C>, region: &Region) -> Option<(usize, f64)> {
-    let Region { low, high, share } = *region;
+    let Region { low, high, share, .. } = *region;
     let side = |axis: usize| high[axis] - low[axis];
     let longest = (1..3).fold(0, |best, axis| if side(axis) > side(best) { axis } else { best });
     if !(side(longest) > 0.0 && side(longest).is_finite()) || mesh.triangles.is_empty() {
@@ -64,7 +69,7 @@ pub fn best_plane<C: Coordinate>(mesh: &Mesh<C>, region: &Region) -> Option<(usi
         }
     }
     let (axis, at) = match best {
-        Some((_, axis, at)) => (axis, at),
+        Some((_, axis, at)) => (axis, least_crossed(mesh, axis, at, region)),
         None => (longest, quantile(mesh, longest, share)),
     };
     (at > low[axis] && at < high[axis]).then_some((axis, at))
@@ -107,6 +112,44 @@ fn places<C: Coordinate>(mesh: &Mesh<C>, axis: usize, region: &Region) -> Vec<(f
     places
 }
 
+/// Of the coordinates at which triangles begin or end, within a slab of a place, the one at which a
+/// plane crosses the fewest triangles; of several the nearest, and the place itself before them.
+fn least_crossed<C: Coordinate>(mesh: &Mesh<C>, axis: usize, place: f64, region: &Region) -> f64 {
+    let slab = (region.high[axis] - region.low[axis]) / PLACES as f64;
+    let (from, to) = (place - slab, place + slab);
+    // Planes over the first of these coordinates and below the second cross a triangle.
+    let (mut starts, mut ends, mut candidates) = (Vec::new(), Vec::new(), vec![place]);
+    for triangle in &mesh.triangles {
+        let along = triangle.map(|vertex| mesh.positions[vertex as usize][axis].wide());
+        let least = along.into_iter().fold(f64::INFINITY, f64::min);
+        let most = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        if least > to || most < from {
+            continue;
+        }
+        candidates.extend([least, most].into_iter().filter(|at| (from..=to).contains(at)));
+        let (start, end) = (least + region.touching, most - region.touching);
+        if start < end {
+            starts.push(start);
+            ends.push(end);
+        }
+    }
+    for coordinates in [&mut starts, &mut ends, &mut candidates] {
+        coordinates.sort_unstable_by(f64::total_cmp);
+    }
+    candidates.dedup();
+    let (mut started, mut ended) = (0, 0);
+    let crossed = candidates.into_iter().map(|at| {
+        started += starts[started..].iter().take_while(|&&start| start < at).count();
+        ended += ends[ended..].iter().take_while(|&&end| end <= at).count();
+        (started - ended, at)
+    });
+    let least = crossed.min_by(|a, b| {
+        let off = |at: f64| (at - place).abs();
+        a.0.cmp(&b.0).then_with(|| off(a.1).total_cmp(&off(b.1)))
+    });
+    least.map_or(place, |(_, at)| at)
+}
+
 /// The coordinate below which this share of the triangles' centres lies.
 fn quantile<C: Coordinate>(mesh: &Mesh<C>, axis: usize, share: f64) -> f64 {
     let centre = |triangle: &[u32; 3]| {
@@ -143,7 +186,7 @@ mod tests {
 
     fn region(mesh: &Mesh, share: f64) -> Region {
         let (low, high) = mesh.bounds().unwrap();
-        Region { low: low.map(f64::from), high: high.map(f64::from), share }
+        Region { low: low.map(f64::from), high: high.map(f64::from), share, touching: 1e-6 }
     }
 
     #[test]
@@ -164,6 +207,21 @@ mod tests {
         let below = mesh.positions.iter().filter(|p| f64::from(p[axis]) < at).count();
         let share = below as f64 / mesh.positions.len() as f64;
         assert!((0.2..=0.8).contains(&share), "{share} below {at} on {axis}");
+    }
+
+    #[test]
+    fn a_plane_near_a_row_goes_through_it_and_a_step_makes_no_difference() {
+        let rows = yard(37);
+        let (axis, at) = best_plane(&rows, &region(&rows, 0.5)).unwrap();
+        assert!(axis == 1 && (at == 18.0 || at == 19.0), "{axis} {at}");
+        let mut shifted = rows.clone();
+        // A row that is not quite straight.
+        for (number, p) in shifted.positions.iter_mut().enumerate() {
+            p[1] += [0.0, 1e-3, -1e-3][number % 3];
+        }
+        let touching = Region { touching: 4e-3, ..region(&shifted, 0.5) };
+        let (axis, at) = best_plane(&shifted, &touching).unwrap();
+        assert!(axis == 1 && (at - at.round()).abs() < 2e-3, "{at}");
     }
 
     #[test]

@@ -102,6 +102,8 @@ impl Part {
 /// From a surface to another; neither may be empty.
 pub(super) struct Directed<'a> {
     from: &'a Original,
+    /// By how much computed distances may be wrong.
+    rounding: f32,
     search: Search<'a>,
     largest: Largest,
     budget: usize,
@@ -122,10 +124,10 @@ pub(super) fn seed(from: &Original, to: &Original, largest: &mut Largest) {
 }
 
 impl<'a> Directed<'a> {
-    pub fn new(from: &'a Original, to: &'a Original, largest: Largest) -> Self {
+    pub fn new(from: &'a Original, to: &'a Original, largest: Largest, rounding: f32) -> Self {
         let triangles = from.triangle_count() + to.triangle_count();
         let budget = BUDGET.max(BUDGET_PER_TRIANGLE * triangles);
-        Self { from, search: Search::new(to), largest, budget }
+        Self { from, rounding, search: Search::new(to), largest, budget }
     }
 
     /// Raises the largest distance to what it is, or to what the budget can say.
@@ -281,7 +283,9 @@ impl<'a> Directed<'a> {
         let limit = self.largest.limit();
         let much_larger = reach > MUCH_LARGER * f64::from(triangle.length + 2.0 * limit);
         if corners.len() <= MOST_CORNERS && !much_larger {
-            let clipped = clip(&corners, centre, reach, &triangle, limit.into());
+            // What is clipped exactly to the limit would seem to be beyond it half of the time.
+            let near = f64::from(limit - self.rounding);
+            let clipped = clip(&corners, centre, reach, &triangle, near);
             if let Some(Clipped { inside, outside }) = clipped {
                 let (farthest, _) = farthest_corner(&triangle, &inside);
                 if self.largest.settles(farthest) {

@@ -74,8 +74,8 @@ pub fn measure(original: &Original, simplified: &Mesh) -> Measured {
     let mut largest = Largest::at_least(2.0 * rounding);
     seed(original, simplified, &mut largest);
     seed(simplified, original, &mut largest);
-    let largest = Directed::new(original, simplified, largest).run();
-    let largest = Directed::new(simplified, original, largest).run();
+    let largest = Directed::new(original, simplified, largest, rounding).run();
+    let largest = Directed::new(simplified, original, largest, rounding).run();
     let equal = largest.bound() <= 2.0 * rounding * TIGHTNESS;
     let bound = match equal {
         true => 0.0,

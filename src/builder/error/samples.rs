@@ -8,7 +8,7 @@ use super::original::Original;
 /// Points of a surface: so many for each triangle, within limits. Fewer leave means of small
 /// surfaces to chance; more of large ones only cost time.
 const POINTS_PER_TRIANGLE: usize = 2;
-const POINTS: std::ops::RangeInclusive<usize> = 64..=512;
+const POINTS: std::ops::RangeInclusive<usize> = 256..=512;
 
 fn points_of(triangles: usize) -> usize {
     (triangles * POINTS_PER_TRIANGLE).clamp(*POINTS.start(), *POINTS.end())

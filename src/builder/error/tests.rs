@@ -3,6 +3,9 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::*;
+use crate::builder::border::vertex::{Border, Path};
+use crate::builder::simplify::ladder::{AppearanceWeights, Method, Simplifier, simplify};
+use crate::mesh::UpAxis;
 
 /// Numbers in [0, 1).
 struct Random(u32);
@@ -352,5 +355,35 @@ fn nothing_is_claimed_of_coordinates_that_are_not_finite() {
         flat.positions[1][0] = bad;
         assert_eq!(surface_error(&good, &flat).bound, f64::INFINITY, "{bad}");
         assert_eq!(surface_error(&Original::of(&flat), &flat).bound, f64::INFINITY, "{bad}");
+    }
+}
+
+/// A plane that comes back exactly, of large triangles over many small ones.
+#[test]
+fn a_plane_of_fewer_triangles_is_at_no_distance() {
+    const SIDE: u32 = 64;
+    let mut plane = Mesh::default();
+    for y in 0..=SIDE {
+        plane.positions.extend((0..=SIDE).map(|x| [x as f32, y as f32, 0.0]));
+    }
+    plane.materials = vec![0; plane.positions.len()];
+    for (x, y) in (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y))) {
+        let at = |x: u32, y: u32| y * (SIDE + 1) + x;
+        let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)];
+        plane.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+    let original = Original::of(&plane);
+    for target in [900, 100, 2] {
+        let method = Method {
+            simplifier: Simplifier::Qem,
+            weights: AppearanceWeights::default(),
+            up: UpAxis::Z,
+            reorientable: &[true],
+        };
+        let border = Border::interior(plane.positions.len());
+        let fewer = simplify(&plane, &border, &Path::default(), 0, target, &method).mesh;
+        assert!(fewer.triangles.len() <= target.max(8));
+        let measured = measure(&original, &fewer);
+        assert_eq!(measured.error.bound, 0.0, "{target}: {measured:?}");
     }
 }

@@ -85,6 +85,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             low: low.map(f64::from),
             high: high.map(f64::from),
             share: (parts / 2) as f64 / parts as f64,
+            touching: self.options.tolerance.sliver_steps * self.lattice.step,
         });
         let Some(region) = region.filter(|_| parts > 1 && !fits) else {
             chunks.push(chunk);

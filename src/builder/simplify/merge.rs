@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::builder::border::slit::close_slits;
 use crate::builder::border::vertex::Border;
 use crate::mesh::{Mesh, PositionKey, color_key, key, texcoord_key};
 
@@ -13,6 +14,7 @@ pub fn merge(children: &[(&Mesh, &Border)], parent_planes: usize) -> (Mesh, Bord
     let parent_bits = if parent_planes >= 64 { !0 } else { (1u64 << parent_planes) - 1 };
     let mut mesh = Mesh::default();
     let mut border = Border::default();
+    let mut released: Vec<bool> = Vec::new();
     let mut welded: FxHashMap<VertexKey, u32> = FxHashMap::default();
     for (child, child_border) in children {
         let mut new_index = Vec::with_capacity(child.positions.len());
@@ -21,6 +23,7 @@ pub fn merge(children: &[(&Mesh, &Border)], parent_planes: usize) -> (Mesh, Bord
             let mut add = || {
                 border.planes.push(planes & parent_bits);
                 border.keep.push(child_border.keep[vertex]);
+                released.push(planes & !parent_bits != 0);
                 mesh.push_vertex_from(child, vertex)
             };
             let index = if planes & !parent_bits == 0 {
@@ -38,6 +41,7 @@ pub fn merge(children: &[(&Mesh, &Border)], parent_planes: usize) -> (Mesh, Bord
         mesh.triangles
             .extend(child.triangles.iter().map(|t| t.map(|vertex| new_index[vertex as usize])));
     }
+    close_slits(&mut mesh, &border, &released);
     (mesh, border)
 }
 
