@@ -3,13 +3,16 @@
 use std::path::Path;
 
 use rayon::prelude::*;
+use rustc_hash::FxHashSet;
 
 use crate::Result;
 use crate::builder::blocks::gather::{divide, gather, localise};
 use crate::builder::blocks::merge_untextured::merge_untextured;
 use crate::builder::blocks::outliers::set_outliers_aside;
 use crate::builder::blocks::plan::{BlockPlan, Division, plan};
-use crate::builder::border::shared::{keep_shared, shared_positions};
+use crate::builder::border::shared::{
+    Bounds, bounds_of, is_of_shared, keep_shared, shared_positions,
+};
 use crate::builder::cut::split::Chunk;
 use crate::builder::emit::disk_sink::{DiskSink, NodeRecord};
 use crate::builder::hierarchy::{BlockBuilder, Resolutions, Tree};
@@ -21,7 +24,7 @@ use crate::builder::stages::{Stage, Stages};
 use crate::format::{BlockInfo, Encoding, OutputDir};
 use crate::lattice::Lattice;
 use crate::lattice::Quantization;
-use crate::mesh::{Material, Model, Part, UpAxis, Warnings};
+use crate::mesh::{Material, Model, Part, PositionKey, UpAxis, Warnings};
 use crate::texture::{
     BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan, texture_factors,
 };
@@ -84,23 +87,19 @@ impl DraftSource {
     fn uncut_positions(&self) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
         match self {
             Self::Parts(_) => self.positions(),
-            Self::Chunk(chunk) => Box::new(
-                chunk
-                    .mesh
-                    .positions
-                    .iter()
-                    .zip(&chunk.border.planes)
-                    .filter(|(_, planes)| **planes == 0)
-                    .map(|(position, _)| *position),
-            ),
+            Self::Chunk(chunk) => {
+                let bits = 0..chunk.path.len() as u32;
+                let shared = bits.filter(|&bit| is_of_shared(chunk.path.plane(bit)));
+                let shared = shared.fold(0u64, |bits, bit| bits | 1 << bit);
+                let of_plane = chunk.mesh.positions.iter().zip(&chunk.border.planes);
+                let uncut = of_plane.filter(move |&(_, &on)| on == 0 || on & shared != 0);
+                Box::new(uncut.map(|(position, _)| *position))
+            }
         }
     }
 
     fn bounds(&self) -> ([f64; 3], [f64; 3]) {
-        let empty = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        self.positions().fold(empty, |(low, high), p| {
-            (std::array::from_fn(|i| low[i].min(p[i])), std::array::from_fn(|i| high[i].max(p[i])))
-        })
+        bounds_of(self.positions())
     }
 }
 
@@ -266,15 +265,33 @@ fn drafts(
             (plan, parts)
         })
         .collect();
-    let drafts_of = |(plan, parts)| drafts_of_plan(&model.materials, plan, parts, options, stages);
+    // Edges that a plan shares with another are not divided where it is: the other would not know.
+    let any_divided = planned.iter().any(|(plan, _)| plan.divide != Division::Whole);
+    let shared = match any_divided && planned.len() > 1 {
+        true => stages.time(Stage::Gather, || shared_by_parts(&planned)),
+        false => FxHashSet::default(),
+    };
+    let drafts_of =
+        |(plan, parts)| drafts_of_plan(&model.materials, plan, parts, &shared, options, stages);
     let drafts: Vec<Vec<Draft>> = planned.into_par_iter().map(drafts_of).collect();
     drafts.into_iter().flatten().collect()
+}
+
+/// Positions that the parts of several plans use.
+fn shared_by_parts(planned: &[(BlockPlan, Vec<Part>)]) -> FxHashSet<PositionKey<f64>> {
+    let positions = |plan: usize| {
+        let parts: &[Part] = &planned[plan].1;
+        parts.iter().flat_map(|part| &part.positions).copied()
+    };
+    let bounds: Vec<Bounds> = (0..planned.len()).map(|plan| bounds_of(positions(plan))).collect();
+    shared_positions(&bounds, positions)
 }
 
 fn drafts_of_plan(
     materials: &[Material],
     BlockPlan { name, divide: division, .. }: BlockPlan,
     parts: Vec<Part>,
+    shared: &FxHashSet<PositionKey<f64>>,
     options: &BuildOptions,
     stages: &Stages,
 ) -> Vec<Draft> {
@@ -293,6 +310,7 @@ fn drafts_of_plan(
     }
     let mut chunk = stages.time(Stage::Gather, || gather(materials, &parts));
     drop(parts);
+    keep_shared(&mut chunk, shared);
     chunk.moved = options.quantize.map(|_| vec![0.0; chunk.mesh.positions.len()]);
     let most = match division {
         Division::Halves { most } => most,

@@ -9,6 +9,7 @@ mod crash;
 mod determinism;
 mod encodings;
 mod golden;
+mod groups;
 mod houses;
 mod incremental;
 mod output;

@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 
 use crate::builder::blocks::plan::{BlockPlan, Division};
-use crate::builder::border::shared::{Bounds, each_shared};
+use crate::builder::border::shared::{Bounds, bounds_of, each_shared};
 use crate::mesh::{Model, Part};
 
 /// Joins the plans that have more than `most` vertices in common with others, each with the plan
@@ -21,10 +21,10 @@ pub fn merge_adjacent(
     most: usize,
     triangles: usize,
 ) -> Vec<BlockPlan> {
-    let bounds: Vec<Bounds> = plans.iter().map(|plan| bounds_of(parts_of(model, plan))).collect();
     let mut shared: BTreeMap<[usize; 2], usize> = BTreeMap::new();
     let positions =
         |plan: usize| parts_of(model, &plans[plan]).flat_map(|part| &part.positions).copied();
+    let bounds: Vec<Bounds> = (0..plans.len()).map(|plan| bounds_of(positions(plan))).collect();
     each_shared(&bounds, positions, |_, first, other| {
         *shared.entry([first, other]).or_default() += 1;
     });
@@ -51,13 +51,6 @@ pub fn merge_adjacent(
 
 fn parts_of<'a>(model: &'a Model, plan: &'a BlockPlan) -> impl Iterator<Item = &'a Part> {
     plan.parts.iter().map(|&part| &model.parts[part])
-}
-
-fn bounds_of<'a>(parts: impl Iterator<Item = &'a Part>) -> Bounds {
-    let empty = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    parts.flat_map(|part| &part.positions).fold(empty, |(low, high), p| {
-        (std::array::from_fn(|i| low[i].min(p[i])), std::array::from_fn(|i| high[i].max(p[i])))
-    })
 }
 
 /// The set of each of `count` things, by its least member, where `shared` tells how much pairs have

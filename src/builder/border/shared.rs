@@ -15,6 +15,14 @@ use crate::mesh::{PositionKey, key};
 /// A box of source coordinates: least and greatest corner.
 pub type Bounds = ([f64; 3], [f64; 3]);
 
+/// The box of some positions; inside out where there are none.
+pub fn bounds_of(positions: impl Iterator<Item = [f64; 3]>) -> Bounds {
+    let empty = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    positions.fold(empty, |(low, high), p| {
+        (std::array::from_fn(|i| low[i].min(p[i])), std::array::from_fn(|i| high[i].max(p[i])))
+    })
+}
+
 /// Finds positions that several blocks use. `blocks` are each block's bounds and positions.
 pub fn shared_positions<P>(
     blocks: &[Bounds],
@@ -69,7 +77,13 @@ pub fn each_shared<P>(
     }
 }
 
-/// Marks the shared vertices of a block, if it has any, as lying on a border that never thins.
+/// Whether a chunk's plane stands for vertices that it shares with other blocks, and is none.
+pub fn is_of_shared(plane: &CutPlane<f64>) -> bool {
+    plane.coordinate.is_nan()
+}
+
+/// Marks the shared vertices of a block, if it has any, as lying on a border that never thins, and
+/// whose edges cuts do not divide.
 pub fn keep_shared(chunk: &mut Chunk<f64>, shared: &FxHashSet<PositionKey<f64>>) {
     if shared.is_empty() || chunk.path.len() >= 60 {
         return;
