@@ -24,6 +24,11 @@ const UNEVEN_TRIANGLES: f64 = 8.0;
 /// The same of the space's.
 const UNEVEN_SPACE: f64 = 0.25;
 
+/// Vertices are a row where a plane through them crosses no more than one in so many of the triangles
+/// that it crosses beside them. Planes through rows that are not quite straight would leave many
+/// vertices beside them, which every level keeps.
+const ROW: usize = 4;
+
 /// A box and what to make of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Region {
@@ -113,7 +118,7 @@ fn places<C: Coordinate>(mesh: &Mesh<C>, axis: usize, region: &Region) -> Vec<(f
 }
 
 /// Of the coordinates at which triangles begin or end, within a slab of a place, the one at which a
-/// plane crosses the fewest triangles; of several the nearest, and the place itself before them.
+/// plane crosses the fewest triangles, if that is a row; of several the nearest, and else the place.
 fn least_crossed<C: Coordinate>(mesh: &Mesh<C>, axis: usize, place: f64, region: &Region) -> f64 {
     let slab = (region.high[axis] - region.low[axis]) / PLACES as f64;
     let (from, to) = (place - slab, place + slab);
@@ -143,11 +148,14 @@ fn least_crossed<C: Coordinate>(mesh: &Mesh<C>, axis: usize, place: f64, region:
         ended += ends[ended..].iter().take_while(|&&end| end <= at).count();
         (started - ended, at)
     });
-    let least = crossed.min_by(|a, b| {
+    let crossed: Vec<(usize, f64)> = crossed.collect();
+    let at_place = crossed.iter().find(|&&(_, at)| at == place).map_or(0, |&(crossed, _)| crossed);
+    let least = crossed.into_iter().min_by(|a, b| {
         let off = |at: f64| (at - place).abs();
         a.0.cmp(&b.0).then_with(|| off(a.1).total_cmp(&off(b.1)))
     });
-    least.map_or(place, |(_, at)| at)
+    let row = least.filter(|&(crossed, _)| crossed <= at_place / ROW);
+    row.map_or(place, |(_, at)| at)
 }
 
 /// The coordinate below which this share of the triangles' centres lies.

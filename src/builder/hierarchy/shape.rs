@@ -191,7 +191,7 @@ mod tests {
         let all = resolutions(900 * 256, TreeShape::Balanced);
         assert_eq!(all.factors.len(), 5);
         let coarse = |resolution, budget| NodePlan::Coarse { resolution, budget };
-        let below = |resolution| Parent { resolution, triangles: 900 * 256 >> (2 * resolution) };
+        let below = |resolution| Parent { resolution, triangles: (900 * 256) >> (2 * resolution) };
         assert_eq!(all.root(900 * 256), coarse(0, 900));
         assert_eq!(all.child(900 * 64, 2, below(0)), coarse(1, 900));
         assert_eq!(all.child(900 * 4, 2, below(0)), coarse(3, 900));
