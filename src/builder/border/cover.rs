@@ -16,7 +16,8 @@ const ROUNDING_STEPS: f64 = 2.0;
 /// the height it has the rectangle's area.
 const TRIANGLE_HEIGHT: f64 = 2.2;
 
-/// A triangle may stand over the ends of the polyline by at most this share of its length.
+/// A triangle may stand over the ends of the polyline by at most this share of its length, and by no
+/// more than the polyline is off: from the corner of a house it would stick out into the street.
 const TRIANGLE_OVERHANG: f64 = 0.1;
 
 /// A polygon over a polyline and its chord.
@@ -52,7 +53,9 @@ impl Cover {
             ((c[1] - a[1]).abs(), (b[0] - a[0]).abs())
         };
         let most = (high - low) * TRIANGLE_HEIGHT + 2.0 * rounding;
-        let overhang = (to - from) * (1.0 + 2.0 * TRIANGLE_OVERHANG);
+        let length = to - from;
+        let beyond = (TRIANGLE_OVERHANG * length).min(high - low + 2.0 * rounding);
+        let overhang = length + 2.0 * beyond;
         let best = [above, below]
             .into_iter()
             .flatten()
@@ -185,6 +188,18 @@ mod tests {
             assert_eq!(upright.triangles(), 2);
         }
         assert_eq!(cover(&[[0.0, 0.0], [1.0, 0.5], [3.0, -0.25], [4.0, 0.0]]).triangles(), 2);
+    }
+
+    #[test]
+    fn nothing_sticks_out_of_the_ends_farther_than_the_border_is_off() {
+        // Nearly level at one end, where the side of a triangle would be long.
+        let points = [[0.0, 0.0], [0.01, 1e-6], [10.0, 0.0024], [12.0, 0.0]];
+        for sign in [1.0, -1.0] {
+            let cover = cover(&points.map(|[y, z]: [f32; 2]| [y, sign * z]));
+            let along = cover.corners.iter().map(|(at, _)| at[1]);
+            let (low, high) = along.fold((0f32, 12f32), |(l, h), y| (l.min(y), h.max(y)));
+            assert!(low > -0.005 && high < 12.005, "{low} {high}");
+        }
     }
 
     #[test]
