@@ -12,10 +12,6 @@ use super::tree::line;
 use crate::format::Scene;
 use crate::lattice::Quantization;
 
-/// A level with fewer nodes has no percentile to speak of: all its nodes are held to the limit of
-/// the 95th instead of the median.
-const FEWEST_FOR_MEDIAN: usize = 5;
-
 /// Compares stored and measured errors of all coarse nodes. What leaves may be off by rounding is
 /// room for both, and the least that is counted as measured; `steps` are the lattice's.
 pub(super) fn errors(
@@ -84,12 +80,11 @@ pub(super) fn errors(
             median_ratio: at(0.5),
             high_ratio: at(0.95),
         };
-        let few = ratios.len() < FEWEST_FOR_MEDIAN;
         for (figure, what, limit) in [
             (found.median_ratio, "in the median", limits.median_error_ratio),
             (found.high_ratio, "for 5 of 100 nodes", limits.high_error_ratio),
         ] {
-            if figure > limit && !(few && figure <= limits.high_error_ratio) {
+            if figure > limit {
                 check.fail(
                     format!("level {level}"),
                     format!("stored errors are {figure:.2} times the measured ones {what}, limit {limit}"),
