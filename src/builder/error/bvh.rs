@@ -180,7 +180,8 @@ pub(super) struct Bvh {
 }
 
 impl Bvh {
-    pub fn new(mesh: &Mesh) -> Self {
+    /// Also the mesh's triangles in each leaf.
+    pub fn new(mesh: &Mesh) -> (Self, Vec<Vec<u32>>) {
         let corners = |&triangle: &[u32; 3]| triangle.map(|v| mesh.positions[v as usize].into());
         let corners: Vec<[Vec3; 3]> = mesh.triangles.iter().map(corners).collect();
         let boxes: Vec<Box3> = corners.iter().map(|&corners| Box3::of(corners)).collect();
@@ -206,6 +207,6 @@ impl Bvh {
         }
         let counts = leaves.iter().map(|members| members.len() as u8).collect();
         let bounds = boxes.into_iter().fold(Box3::EMPTY, Box3::and);
-        Self { tree, leaves: frames, counts, bounds, longest }
+        (Self { tree, leaves: frames, counts, bounds, longest }, leaves)
     }
 }

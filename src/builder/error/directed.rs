@@ -18,6 +18,7 @@ use glam::{DVec3, Vec3};
 
 use super::bvh::{Box3, LEAF};
 use super::original::{Original, Search, TriangleId};
+use super::overlay::{Mark, Marks, Overlay};
 use super::polygon::{Clipped, Polygon, bisect, centroid, clip};
 use super::triangle::{LANES, Points, Triangle, max};
 
@@ -102,11 +103,23 @@ impl Part {
 /// From a surface to another; neither may be empty.
 pub(super) struct Directed<'a> {
     from: &'a Original,
+    /// What the way back has told of its triangles.
+    marks: Option<Marks>,
     /// By how much computed distances may be wrong.
     rounding: f32,
     search: Search<'a>,
+    overlay: Overlay<'a>,
     largest: Largest,
     budget: usize,
+}
+
+/// A triangle that is not settled.
+struct Open {
+    id: TriangleId,
+    /// See [`Part`].
+    bound: f32,
+    /// A triangle that it is above or below.
+    start: TriangleId,
 }
 
 /// Measures some points, spread evenly.
@@ -127,21 +140,28 @@ impl<'a> Directed<'a> {
     pub fn new(from: &'a Original, to: &'a Original, largest: Largest, rounding: f32) -> Self {
         let triangles = from.triangle_count() + to.triangle_count();
         let budget = BUDGET.max(BUDGET_PER_TRIANGLE * triangles);
-        Self { from, rounding, search: Search::new(to), largest, budget }
+        let (search, overlay) = (Search::new(to), Overlay::new(to));
+        Self { from, marks: None, rounding, search, overlay, largest, budget }
     }
 
-    /// Raises the largest distance to what it is, or to what the budget can say.
-    pub fn run(mut self) -> Largest {
+    /// With what the way back has told. The surface it goes to must be of one mesh.
+    pub fn with_marks(self, marks: Marks) -> Self {
+        Self { marks: Some(marks), ..self }
+    }
+
+    /// Raises the largest distance to what it is, or to what the budget can say; also what was
+    /// learnt of the other surface.
+    pub fn run(mut self) -> (Largest, Marks) {
         let mut open = Vec::new();
         for (number, part) in (0..).zip(&self.from.parts) {
             self.child(number, part.bvh.tree.root, part.bvh.bounds, &mut open);
         }
         let mut left = BinaryHeap::new();
-        for part in open {
-            self.divide(part, &mut left);
+        for triangle in open {
+            self.triangle(triangle, &mut left);
         }
         self.divide_rest(left);
-        self.largest
+        (self.largest, self.overlay.into_marks())
     }
 
     /// Measures a point of the surface, to no less than `enough` or the largest so far.
@@ -159,7 +179,10 @@ impl<'a> Directed<'a> {
         self.measure(centre, settling.max(self.largest.found * NEAR_ENOUGH))
     }
 
-    fn child(&mut self, part: u32, child: u32, bounds: Box3, open: &mut Vec<Part>) {
+    fn child(&mut self, part: u32, child: u32, bounds: Box3, open: &mut Vec<Open>) {
+        if child & LEAF != 0 && self.unsettled(part, child & !LEAF) == 0 {
+            return;
+        }
         let reach = bounds.diagonal() * 0.5;
         let limit = self.largest.limit();
         // Otherwise not even a centre on the other surface would do.
@@ -178,22 +201,37 @@ impl<'a> Directed<'a> {
         }
     }
 
+    /// The lanes of a leaf that the way back has not settled, one bit each.
+    fn unsettled(&self, part: u32, leaf: u32) -> u32 {
+        let count = self.from.parts[part as usize].bvh.counts[leaf as usize];
+        let is_open = |&lane: &u32| !self.mark(part, leaf, lane).is_some_and(Mark::is_settled);
+        (0..count.into()).filter(is_open).fold(0, |lanes, lane| lanes | 1 << lane)
+    }
+
+    fn mark(&self, part: u32, leaf: u32, lane: u32) -> Option<Mark> {
+        Some(self.marks.as_ref()?.of(TriangleId { part, leaf, lane }))
+    }
+
     /// Settles triangles of a leaf, all at a time, by triangles of the other surface that one of
     /// them is near to.
-    fn leaf(&mut self, part: u32, leaf: u32, open: &mut Vec<Part>) {
+    fn leaf(&mut self, part: u32, leaf: u32, open: &mut Vec<Open>) {
         let bvh = &self.from.parts[part as usize].bvh;
         let corners = bvh.leaves[leaf as usize].corners();
         let mut bounds = [f32::INFINITY; LANES];
-        let mut unsettled = (1u32 << bvh.counts[leaf as usize]) - 1;
+        let mut unsettled = self.unsettled(part, leaf);
         while unsettled != 0 {
             let chosen = unsettled.trailing_zeros() as usize;
-            let [a, b, c] = [0, 1, 2].map(|corner| corners[corner].lane(chosen));
-            let centre = (a + b + c) / 3.0;
-            let reach = [a, b, c].map(|corner| corner.distance_squared(centre));
-            let reach = reach.into_iter().fold(0f32, f32::max).sqrt();
-            let (distance, near) = self.measure_near(centre, reach);
-            bounds[chosen] = bounds[chosen].min(distance + reach);
-            let triangle = self.search.original().triangle(near);
+            let marked = self.mark(part, leaf, chosen as u32).and_then(Mark::slot);
+            let start = marked.map(|slot| TriangleId::of_slot(0, slot)).unwrap_or_else(|| {
+                let [a, b, c] = [0, 1, 2].map(|corner| corners[corner].lane(chosen));
+                let centre = (a + b + c) / 3.0;
+                let reach = [a, b, c].map(|corner| corner.distance_squared(centre));
+                let reach = reach.into_iter().fold(0f32, f32::max).sqrt();
+                let (distance, near) = self.measure_near(centre, reach);
+                bounds[chosen] = bounds[chosen].min(distance + reach);
+                near
+            });
+            let triangle = self.search.original().triangle(start);
             let squared = [0, 1, 2].map(|corner| triangle.squared_distances(&corners[corner]));
             let [a, b, c] = squared;
             let tried = unsettled;
@@ -210,16 +248,38 @@ impl<'a> Directed<'a> {
             unsettled &= !(1 << chosen);
             for (corners, squared) in corners.iter().zip(squared) {
                 // Others are known to be nearer than what was found.
-                if squared[chosen] > self.largest.found.powi(2) {
+                if marked.is_none() && squared[chosen] > self.largest.found.powi(2) {
                     self.measure(corners.lane(chosen), self.largest.found);
                 }
             }
             let bound = bounds[chosen];
             if !self.largest.settles(bound) {
-                let corners = corners.map(|corners| corners.lane(chosen).as_dvec3()).to_vec();
-                open.push(Part { corners, bound, near: Some((distance, near)) });
+                let id = TriangleId { part, leaf, lane: chosen as u32 };
+                open.push(Open { id, bound, start });
             }
         }
+    }
+
+    /// Settles a triangle by its overlay, else by dividing it.
+    fn triangle(&mut self, open: Open, left: &mut BinaryHeap<Waiting>) {
+        let Open { id, bound, start } = open;
+        let triangle = self.from.triangle(id);
+        if self.largest.settles(bound) || self.settles_overlay(&triangle, id, start) {
+            return;
+        }
+        let corners = triangle.corners();
+        let nearest = self.measure((corners[0] + corners[1] + corners[2]) / 3.0, 0.0);
+        if nearest.1 != start && self.settles_overlay(&triangle, id, nearest.1) {
+            return;
+        }
+        let corners = corners.map(|corner| corner.as_dvec3()).to_vec();
+        self.divide(Part { corners, bound, near: Some(nearest) }, left);
+    }
+
+    fn settles_overlay(&mut self, triangle: &Triangle, id: TriangleId, start: TriangleId) -> bool {
+        let limit = self.largest.limit();
+        let bound = self.overlay.bound(triangle, id.slot(), start, limit, self.rounding);
+        bound.is_some_and(|bound| self.largest.settles(bound))
     }
 
     /// Divides a triangle and what it is divided into, to some number of polygons.

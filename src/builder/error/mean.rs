@@ -24,7 +24,7 @@ impl<'a> MeanDistance<'a> {
     /// that.
     pub fn to(&mut self, other: &Mesh, limit: f64) -> f64 {
         let surface = |mesh: &Mesh| {
-            let surface = Original::of(mesh);
+            let surface = Original::of_points(mesh);
             let points = surface.samples();
             (surface, points)
         };

@@ -5,10 +5,12 @@
 //! - `directed`, `polygon`: the bound on the largest distance, one way
 //! - `samples`: points for the mean, and [`MeanDistance`] to choose among meshes by it
 
+mod adjacency;
 mod bvh;
 mod directed;
 mod mean;
 mod original;
+mod overlay;
 mod polygon;
 mod samples;
 mod stored;
@@ -74,8 +76,10 @@ pub fn measure(original: &Original, simplified: &Mesh) -> Measured {
     let mut largest = Largest::at_least(2.0 * rounding);
     seed(original, simplified, &mut largest);
     seed(simplified, original, &mut largest);
-    let largest = Directed::new(original, simplified, largest, rounding).run();
-    let largest = Directed::new(simplified, original, largest, rounding).run();
+    // This way first: each of its triangles settles several of the original.
+    let (largest, marks) = Directed::new(simplified, original, largest, rounding).run();
+    let back = Directed::new(original, simplified, largest, rounding).with_marks(marks);
+    let (largest, _) = back.run();
     let equal = largest.bound() <= 2.0 * rounding * TIGHTNESS;
     let bound = match equal {
         true => 0.0,

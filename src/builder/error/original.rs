@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use super::adjacency::{Adjacency, Links, Slot};
 use super::bvh::{Box3, Bvh, LEAF, Node, Tree};
 use super::samples::Samples;
 use super::triangle::{LANES, Triangle, min};
@@ -18,6 +19,8 @@ pub struct Original {
     top: Arc<Tree>,
     /// The part of each leaf.
     numbers: Vec<u32>,
+    /// Where parts meet.
+    pub(super) links: Arc<Links>,
     pub(super) bounds: Box3,
     /// The longest edge.
     pub(super) longest: f32,
@@ -28,6 +31,7 @@ pub struct Original {
 pub(super) struct Part {
     pub bvh: Bvh,
     pub samples: Samples,
+    pub adjacency: Adjacency,
 }
 
 /// A triangle of an [`Original`].
@@ -38,15 +42,36 @@ pub(super) struct TriangleId {
     pub lane: u32,
 }
 
+impl TriangleId {
+    pub fn of_slot(part: u32, slot: Slot) -> Self {
+        Self { part, leaf: slot / LANES as u32, lane: slot % LANES as u32 }
+    }
+
+    pub fn slot(self) -> Slot {
+        self.leaf * LANES as u32 + self.lane
+    }
+}
+
 impl Original {
     /// The surface of one mesh.
     pub fn of(mesh: &Mesh) -> Self {
         if mesh.triangles.is_empty() {
             return Self::from_parts(Vec::new());
         }
-        let bvh = Bvh::new(mesh);
+        let (bvh, leaves) = Bvh::new(mesh);
+        let adjacency = Adjacency::new(mesh, &leaves);
         let samples = Samples::of(&bvh);
-        Self::from_parts(vec![Arc::new(Part { bvh, samples })])
+        Self::from_parts(vec![Arc::new(Part { bvh, samples, adjacency })])
+    }
+
+    /// The surface of one mesh, of which nothing is asked but what is near points.
+    pub(super) fn of_points(mesh: &Mesh) -> Self {
+        if mesh.triangles.is_empty() {
+            return Self::from_parts(Vec::new());
+        }
+        let (bvh, _) = Bvh::new(mesh);
+        let samples = Samples::of(&bvh);
+        Self::from_parts(vec![Arc::new(Part { bvh, samples, adjacency: Adjacency::default() })])
     }
 
     /// Several surfaces as one. Their triangles are shared, not copied.
@@ -62,6 +87,7 @@ impl Original {
             numbers: leaves.into_iter().flatten().collect(),
             bounds: boxes.into_iter().fold(Box3::EMPTY, Box3::and),
             longest: parts.iter().map(|part| part.bvh.longest).fold(0.0, f32::max),
+            links: Arc::new(Links::between(parts.iter().map(|part| &part.adjacency))),
             parts,
         }
     }

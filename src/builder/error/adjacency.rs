@@ -1,0 +1,176 @@
+//! Which triangles share edges, by positions: vertices differ at texture seams.
+
+use meshopt::{VertexDataAdapter, generate_position_remap};
+use rustc_hash::FxHashMap;
+
+use super::triangle::LANES;
+use crate::mesh::{Mesh, PositionKey, key};
+
+/// A triangle of one mesh: the number of its leaf times eight, and its lane.
+pub(super) type Slot = u32;
+
+/// In place of a neighbour: the edge belongs to one triangle, or to more than two.
+const NONE: Slot = u32::MAX;
+
+/// The triangles of one mesh with their neighbours.
+#[derive(Debug, Default)]
+pub(super) struct Adjacency {
+    /// One to a slot; those that are not used have no neighbours.
+    pub triangles: Vec<Linked>,
+    /// Edges that one triangle has.
+    open: Vec<OpenEdge>,
+}
+
+/// What a walk over the surface needs of a triangle, side by side in memory.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Linked {
+    /// As the mesh has them: three of x, of y and of z.
+    pub corners: [[f32; 3]; 3],
+    /// Across the edges from the first corner on.
+    across: [Slot; 3],
+}
+
+impl Linked {
+    const UNUSED: Self = Self { corners: [[0.0; 3]; 3], across: [NONE; 3] };
+
+    /// The triangle across an edge.
+    #[inline(always)]
+    pub fn across(&self, edge: usize) -> Option<Slot> {
+        (self.across[edge] != NONE).then_some(self.across[edge])
+    }
+}
+
+/// An edge at the border of a mesh.
+#[derive(Clone, Copy, Debug)]
+struct OpenEdge {
+    /// In order.
+    ends: [PositionKey<f32>; 2],
+    slot: Slot,
+    edge: u8,
+}
+
+impl Adjacency {
+    /// Of a mesh whose triangles are in these leaves.
+    pub fn new(mesh: &Mesh, leaves: &[Vec<u32>]) -> Self {
+        let bytes = bytemuck::cast_slice(&mesh.positions);
+        let Ok(vertices) = VertexDataAdapter::new(bytes, size_of::<[f32; 3]>(), 0) else {
+            return Self::default();
+        };
+        let places = generate_position_remap(&vertices);
+        let mut edges = EdgesByPlace::new(places.len());
+        for &corners in &mesh.triangles {
+            (0..3).for_each(|edge| edges.count(ends(corners, edge, &places)));
+        }
+        edges.allot();
+        let mut triangles = vec![Linked::UNUSED; leaves.len() * LANES];
+        for (slot, triangle) in slots(leaves) {
+            let corners = mesh.triangles[triangle as usize];
+            for edge in 0..3 {
+                edges.put(ends(corners, edge.into(), &places), (slot, edge));
+            }
+            let axis = |axis: usize| corners.map(|v| mesh.positions[v as usize][axis]);
+            triangles[slot as usize].corners = [0, 1, 2].map(axis);
+        }
+        let mut open = Vec::new();
+        for place in 0..places.len() as u32 {
+            let edges = edges.of(place);
+            edges.sort_unstable();
+            for same in edges.chunk_by(|a, b| a.0 == b.0) {
+                match *same {
+                    [(other, (slot, edge))] => {
+                        let mut ends = [place, other].map(|v| key(mesh.positions[v as usize]));
+                        ends.sort_unstable();
+                        open.push(OpenEdge { ends, slot, edge });
+                    }
+                    [(_, (a, of_a)), (_, (b, of_b))] => {
+                        triangles[a as usize].across[usize::from(of_a)] = b;
+                        triangles[b as usize].across[usize::from(of_b)] = a;
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Self { triangles, open }
+    }
+}
+
+/// The slots that are used, each with its triangle.
+fn slots(leaves: &[Vec<u32>]) -> impl Iterator<Item = (Slot, u32)> {
+    let of_leaf = |(leaf, members): (u32, &Vec<u32>)| {
+        let slots = leaf * LANES as u32..;
+        slots.zip(members.clone())
+    };
+    (0..).zip(leaves).flat_map(of_leaf)
+}
+
+/// The places of an edge's ends, the lower number first.
+fn ends(corners: [u32; 3], edge: usize, places: &[u32]) -> (u32, u32) {
+    let [a, b] = [corners[edge], corners[(edge + 1) % 3]].map(|v| places[v as usize]);
+    (a.min(b), a.max(b))
+}
+
+/// Edges in order of their lower places.
+struct EdgesByPlace {
+    begins: Vec<u32>,
+    edges: Vec<(u32, (Slot, u8))>,
+}
+
+impl EdgesByPlace {
+    fn new(vertices: usize) -> Self {
+        Self { begins: vec![0; vertices + 2], edges: Vec::new() }
+    }
+
+    fn count(&mut self, (low, _): (u32, u32)) {
+        self.begins[low as usize + 2] += 1;
+    }
+
+    /// Makes room for what was counted.
+    fn allot(&mut self) {
+        let mut sum = 0;
+        for begin in &mut self.begins {
+            sum += *begin;
+            *begin = sum;
+        }
+        self.edges = vec![(0, (NONE, 0)); sum as usize];
+    }
+
+    fn put(&mut self, (low, high): (u32, u32), edge: (Slot, u8)) {
+        let at = &mut self.begins[low as usize + 1];
+        self.edges[*at as usize] = (high, edge);
+        *at += 1;
+    }
+
+    fn of(&mut self, low: u32) -> &mut [(u32, (Slot, u8))] {
+        let [begin, end] = [low, low + 1].map(|v| self.begins[v as usize] as usize);
+        &mut self.edges[begin..end]
+    }
+}
+
+/// Links over the edges where meshes meet: from the part, slot and edge of a triangle to the
+/// part and slot of its neighbour.
+#[derive(Debug, Default)]
+pub(super) struct Links(FxHashMap<(u32, Slot, u8), (u32, Slot)>);
+
+impl Links {
+    /// Of some meshes, in the order of their numbers.
+    pub fn between<'a>(parts: impl Iterator<Item = &'a Adjacency>) -> Self {
+        let open = |(part, adjacency): (u32, &'a Adjacency)| {
+            adjacency.open.iter().map(move |&edge| (edge.ends, part, edge))
+        };
+        let mut edges: Vec<_> = (0..).zip(parts).flat_map(open).collect();
+        edges.sort_unstable_by_key(|&(ends, part, edge)| (ends, part, edge.slot, edge.edge));
+        let mut links = FxHashMap::default();
+        for same in edges.chunk_by(|a, b| a.0 == b.0) {
+            if let [(_, part, a), (_, other, b)] = *same {
+                links.insert((part, a.slot, a.edge), (other, b.slot));
+                links.insert((other, b.slot, b.edge), (part, a.slot));
+            }
+        }
+        Self(links)
+    }
+
+    /// The triangle across an edge.
+    pub fn across(&self, part: u32, slot: Slot, edge: usize) -> Option<(u32, Slot)> {
+        self.0.get(&(part, slot, edge as u8)).copied()
+    }
+}
