@@ -43,6 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 weights: AppearanceWeights::default(),
                 up: model.up.unwrap_or(UpAxis::Z),
                 reorientable: &reorientable,
+                without: None,
             };
             let (mut made, mut measured) = (Duration::ZERO, Duration::ZERO);
             let (mut triangles, mut exhausted, mut tightness) = (0, 0, Vec::new());

@@ -6,10 +6,11 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use crate::Result;
+use crate::builder::blocks::block_plan::{BlockPlan, Division};
 use crate::builder::blocks::gather::{divide, gather, localise};
 use crate::builder::blocks::merge_untextured::merge_untextured;
 use crate::builder::blocks::outliers::set_outliers_aside;
-use crate::builder::blocks::plan::{BlockPlan, Division, plan};
+use crate::builder::blocks::plan::plan;
 use crate::builder::border::shared::{
     Bounds, bounds_of, is_of_shared, keep_shared, shared_positions,
 };
@@ -17,10 +18,10 @@ use crate::builder::cut::split::Chunk;
 use crate::builder::emit::disk_sink::{DiskSink, NodeRecord};
 use crate::builder::hierarchy::{BlockBuilder, Resolutions, Tree};
 use crate::builder::options::BuildOptions;
-use crate::builder::pipeline::in_parallel;
 use crate::builder::progress::Progress;
 use crate::builder::simplify::orient::reorientable;
 use crate::builder::stages::{Stage, Stages};
+use crate::builder::threads::in_parallel;
 use crate::format::{BlockInfo, Encoding, OutputDir};
 use crate::lattice::Lattice;
 use crate::lattice::Quantization;

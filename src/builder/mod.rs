@@ -24,6 +24,7 @@ pub mod progress;
 pub mod reuse;
 pub mod simplify;
 pub mod stages;
+pub mod threads;
 pub mod up;
 
 pub use options::BuildOptions;

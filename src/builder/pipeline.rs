@@ -5,8 +5,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use rayon::prelude::*;
-
 use crate::builder::block::{BuiltBlock, build_input};
 use crate::builder::emit::disk_sink::{NodeRecord, check_unique};
 use crate::builder::emit::forest::{append_nodes, make_errors_monotone};
@@ -14,12 +12,13 @@ use crate::builder::inputs::{describe, fingerprint, text_of, unchanged};
 use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
 use crate::builder::reuse::Earlier;
-use crate::builder::simplify::ladder::{BUDGET_TOLERANCE, LadderStep};
+use crate::builder::simplify::ladder::BUDGET_TOLERANCE;
+use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::{Stage, Stages};
 use crate::cpu_time::CpuTime;
 use crate::format::{
-    BlockInfo, NODES_DIR, Node, OutputDir, REPORT_FILE, SCENE_FILE, Scene, SharedTexture,
-    TEXTURES_DIR, check_apart, fits_in_steps,
+    BlockInfo, Node, OutputDir, REPORT_FILE, SCENE_FILE, Scene, SharedTexture, TEXTURES_DIR,
+    check_apart, fits_in_steps,
 };
 use crate::lattice::Quantization;
 use crate::mesh::{Model, UpAxis, Warnings};
@@ -75,41 +74,91 @@ pub fn build(
     }
 
     let output = OutputDir::create(out)?;
-    let shared = SharedTextures::new();
-    let mut reports: Vec<InputReport> = Vec::with_capacity(inputs.len());
-    let mut blocks: Vec<BuiltBlock> = Vec::new();
-    let mut reused_textures: BTreeMap<String, SharedTexture> = BTreeMap::new();
-    let mut ahead: Option<Result<Model>> = None;
+    let run = Run {
+        options,
+        globe,
+        output: &output,
+        shared: SharedTextures::new(),
+        stages: &stages,
+        progress,
+    };
+    let done = run.inputs(&inputs, &still_good, earlier.as_ref())?;
+    progress.finishing();
+    let report = run.finish(done, earlier.as_ref(), parameters, begin)?;
+    output.commit()?;
+    Ok(Outcome::Built(report))
+}
 
-    for (number, input) in inputs.iter().enumerate() {
-        if let (Some(report), Some(earlier)) = (&still_good[number], &earlier) {
-            let taken = earlier.take_over(report, &output)?;
-            progress.built(report.triangles);
-            reused_textures.extend(taken.shared_textures);
-            blocks.extend(taken.blocks);
-            reports.push(report.clone());
-            continue;
+/// What all steps of a build share.
+struct Run<'a> {
+    options: &'a BuildOptions,
+    globe: Option<Globe>,
+    output: &'a OutputDir,
+    shared: SharedTextures,
+    stages: &'a Stages,
+    progress: &'a dyn Progress,
+}
+
+/// What has come of inputs, in their order.
+#[derive(Default)]
+struct Done {
+    reports: Vec<InputReport>,
+    blocks: Vec<BuiltBlock>,
+    /// Shared textures of earlier results, by name.
+    reused_textures: BTreeMap<String, SharedTexture>,
+}
+
+impl Run<'_> {
+    /// Builds inputs one after another, or takes over what `still_good` says of them.
+    fn inputs(
+        &self,
+        inputs: &[PathBuf],
+        still_good: &[Option<InputReport>],
+        earlier: Option<&Earlier>,
+    ) -> Result<Done> {
+        let mut done = Done::default();
+        let mut ahead: Option<Result<Model>> = None;
+        for (number, input) in inputs.iter().enumerate() {
+            if let (Some(report), Some(earlier)) = (&still_good[number], earlier) {
+                let taken = earlier.take_over(report, self.output)?;
+                self.progress.built(report.triangles);
+                done.reused_textures.extend(taken.shared_textures);
+                done.blocks.extend(taken.blocks);
+                done.reports.push(report.clone());
+                continue;
+            }
+            self.progress.reading(input, number + 1, inputs.len());
+            let model = ahead.take().unwrap_or_else(|| self.load(input))?;
+            // Only the input that comes next in turn, and only where both fit in memory.
+            let is_next = still_good.get(number + 1).is_some_and(Option::is_none);
+            let next = inputs.get(number + 1).filter(|next| is_next && fits_beside(input, next));
+            let (built, read_ahead) = rayon::join(
+                || self.input(input, model, inputs.len()),
+                || next.map(|next| self.load(next)),
+            );
+            ahead = read_ahead;
+            let (blocks, report) = built?;
+            done.blocks.extend(blocks);
+            done.reports.push(report);
         }
-        progress.reading(input, number + 1, inputs.len());
-        let load = |input: &Path| {
-            let cpu_time = CpuTime::default();
-            let model = import::load_timed(input, &cpu_time);
-            stages.add(Stage::Import, cpu_time.total());
-            model
-        };
-        let mut model = match ahead.take() {
-            Some(model) => model,
-            None => load(input),
-        }?;
-        let next = inputs[number + 1..]
-            .iter()
-            .zip(&still_good[number + 1..])
-            .find(|(_, good)| good.is_none())
-            .map(|(next, _)| next)
-            .filter(|next| {
-                // Only the input that comes next in turn, and only where both fit in memory.
-                still_good.get(number + 1).is_some_and(Option::is_none) && fits_beside(input, next)
-            });
+        Ok(done)
+    }
+
+    fn load(&self, input: &Path) -> Result<Model> {
+        let cpu_time = CpuTime::default();
+        let model = import::load_timed(input, &cpu_time);
+        self.stages.add(Stage::Import, cpu_time.total());
+        model
+    }
+
+    /// Builds one of so many inputs.
+    fn input(
+        &self,
+        input: &Path,
+        mut model: Model,
+        inputs: usize,
+    ) -> Result<(Vec<BuiltBlock>, InputReport)> {
+        let &Self { options, output, stages, progress, .. } = self;
         let dependencies = model.dependencies.clone();
         let triangles = model.triangle_count() as u64;
         progress.found(triangles);
@@ -121,27 +170,21 @@ pub fn build(
             (None, None) => (crate::builder::up::guess(&model), UpFrom::Shape),
         };
         options.placement.localise(&mut model, up)?;
-        check_place(&model, up, globe.as_ref())?;
+        check_place(&model, up, self.globe.as_ref())?;
         if let Some(quantization) = options.quantization() {
             quantization.check(&model)?;
-            if inputs.len() == 1 {
+            if inputs == 1 {
                 quantization.check_extent(model.bounds())?;
             }
         }
-        let ((built, files), read_ahead) = rayon::join(
-            || {
-                rayon::join(
-                    || build_input(model, up, options, &output, &shared, &stages, progress),
-                    || describe(&dependencies, &stages),
-                )
-            },
-            || next.map(|next| load(next)),
+        let (built, files) = rayon::join(
+            || build_input(model, up, options, output, &self.shared, stages, progress),
+            || describe(&dependencies, stages),
         );
-        ahead = read_ahead;
         let (built, files) = (built?, files?);
         let mut warnings = built.warnings;
         let outcomes = outcomes(&built.blocks, &mut warnings);
-        reports.push(InputReport {
+        let report = InputReport {
             path: text_of(input),
             files,
             triangles,
@@ -150,15 +193,70 @@ pub fn build(
             up_from: Some(up_from),
             outcomes,
             warnings: Count::of_warnings(&warnings),
-        });
-        blocks.extend(built.blocks);
+        };
+        Ok((built.blocks, report))
     }
-    progress.finishing();
 
-    let source_triangles = reports.iter().map(|input| input.triangles).sum();
-    let source_texels =
-        reports.iter().map(|input| input.texels).sum::<u64>() + shared.source_texels();
-    let mut shared_textures = reused_textures;
+    /// Writes what belongs to no node: shared textures, tileset, scene and report.
+    fn finish(
+        self,
+        done: Done,
+        earlier: Option<&Earlier>,
+        parameters: serde_json::Value,
+        begin: Instant,
+    ) -> Result<BuildReport> {
+        let Done { reports, blocks, reused_textures } = done;
+        let source_texels =
+            reports.iter().map(|input| input.texels).sum::<u64>() + self.shared.source_texels();
+        let mut warnings = warnings(&reports, earlier, self.globe.as_ref());
+        let shared_textures = write_textures(self.shared, reused_textures, self.output)?;
+        let over_budget = over_budget(&blocks, &mut warnings);
+        let baked = baked(&blocks);
+        let up = agreed_up(&reports, &mut warnings);
+        let scene = scene_of(blocks, shared_textures, parameters.clone(), up, &reports)?;
+        let quantization = self.options.quantization();
+        if let (Some(quantization), Some(bounds)) = (quantization, scene.bounds()) {
+            quantization.check_extent(bounds)?;
+        }
+        let tilesets = self.stages.time(Stage::Write, || write_tilesets(&scene, self.output))?;
+        let mut levels = level_reports(&scene);
+        for over in &over_budget {
+            if let Some(node) = scene.nodes.iter().find(|node| node.id == over.id) {
+                levels[node.level as usize].over_budget += 1;
+            }
+        }
+        let seconds = |stage: Stage| self.stages.seconds(stage);
+        let report = BuildReport {
+            version: env!("CARGO_PKG_VERSION").into(),
+            parameters,
+            source_triangles: reports.iter().map(|input| input.triangles).sum(),
+            source_texels,
+            levels,
+            stages: Stage::ALL
+                .map(|stage| StageReport { stage: stage.name().into(), seconds: seconds(stage) })
+                .to_vec(),
+            seconds: begin.elapsed().as_secs_f64(),
+            peak_memory_bytes: crate::builder::memory::peak_bytes(),
+            outcomes: most_frequent(reports.iter().flat_map(|input| &input.outcomes).cloned()),
+            inputs: reports,
+            tilesets,
+            quantized: quantization.map(|quantization| quantized(&scene, quantization)),
+            over_budget,
+            baked,
+            warnings: Count::of_warnings(&warnings),
+        };
+        self.output.write(SCENE_FILE, &scene.to_bytes()?)?;
+        self.output.write(REPORT_FILE, report.to_json()?.as_bytes())?;
+        Ok(report)
+    }
+}
+
+/// Writes new shared textures beside those of earlier results: all of them, by name.
+fn write_textures(
+    shared: SharedTextures,
+    mut textures: BTreeMap<String, SharedTexture>,
+    output: &OutputDir,
+) -> Result<BTreeMap<String, SharedTexture>> {
     for file in shared.into_files() {
         let texture = SharedTexture {
             file_name: file.name.to_string(),
@@ -166,70 +264,40 @@ pub fn build(
             height: file.height,
             bytes: file.bytes.len() as u64,
         };
-        if shared_textures.insert(file.name.to_string(), texture).is_none() {
+        if textures.insert(file.name.to_string(), texture).is_none() {
             output.write(format!("{TEXTURES_DIR}/{}", file.name), &file.bytes)?;
         }
     }
+    Ok(textures)
+}
+
+fn write_tilesets(scene: &Scene, output: &OutputDir) -> Result<Vec<FileReport>> {
+    // As whoever reads the scene will see it.
+    let placement = placement_of(&scene.parameters)?;
+    let mut reports = Vec::new();
+    for file in tileset::files(scene, &placement)? {
+        output.write(&file.path, &file.bytes)?;
+        reports.push(FileReport::of(&file.path, &file.bytes));
+    }
+    Ok(reports)
+}
+
+/// What was imperfect in inputs, and in where the result stands.
+fn warnings(reports: &[InputReport], earlier: Option<&Earlier>, globe: Option<&Globe>) -> Warnings {
     let mut warnings = Warnings::default();
     for warning in reports.iter().flat_map(|input| &input.warnings) {
         warnings.add(&warning.text, warning.count);
     }
-    if let Some(earlier) = &earlier
-        && earlier.report.tilesets.is_empty()
-    {
+    if earlier.is_some_and(|earlier| earlier.report.tilesets.is_empty()) {
         let file = crate::format::TILESET_FILE;
         let text =
             format!("earlier result without {file} (by an older version): added to its nodes");
         warnings.add(text, 1);
     }
-    if let Some(caveat) = globe.as_ref().and_then(Globe::caveat) {
+    if let Some(caveat) = globe.and_then(Globe::caveat) {
         warnings.add(caveat, 1);
     }
-    let over_budget = over_budget(&blocks, &mut warnings);
-    let baked = baked(&blocks);
-    let up = agreed_up(&reports, &mut warnings);
-    let scene = scene_of(blocks, shared_textures, parameters.clone(), up, &reports)?;
-
-    if let (Some(quantization), Some(bounds)) = (options.quantization(), scene.bounds()) {
-        quantization.check_extent(bounds)?;
-    }
-    // As whoever reads the scene will see it.
-    let placement = placement_of(&scene.parameters)?;
-    let mut tilesets = Vec::new();
-    for file in stages.time(Stage::Write, || tileset::files(&scene, &placement))? {
-        output.write(&file.path, &file.bytes)?;
-        tilesets.push(FileReport::of(&file.path, &file.bytes));
-    }
-    let mut levels = level_reports(&scene);
-    for over in &over_budget {
-        if let Some(node) = scene.nodes.iter().find(|node| node.id == over.id) {
-            levels[node.level as usize].over_budget += 1;
-        }
-    }
-    let quantized = options.quantization().map(|quantization| quantized(&scene, quantization));
-    let report = BuildReport {
-        version: env!("CARGO_PKG_VERSION").into(),
-        parameters,
-        source_triangles,
-        source_texels,
-        levels,
-        stages: Stage::ALL
-            .map(|stage| StageReport { stage: stage.name().into(), seconds: stages.seconds(stage) })
-            .to_vec(),
-        seconds: begin.elapsed().as_secs_f64(),
-        peak_memory_bytes: crate::builder::memory::peak_bytes(),
-        outcomes: most_frequent(reports.iter().flat_map(|input| &input.outcomes).cloned()),
-        inputs: reports,
-        tilesets,
-        quantized,
-        over_budget,
-        baked,
-        warnings: Count::of_warnings(&warnings),
-    };
-    output.write(SCENE_FILE, &scene.to_bytes()?)?;
-    output.write(REPORT_FILE, report.to_json()?.as_bytes())?;
-    output.commit()?;
-    Ok(Outcome::Built(report))
+    warnings
 }
 
 fn quantized(scene: &Scene, quantization: Quantization) -> Quantized {
@@ -365,32 +433,4 @@ fn scene_of(
         shared_textures: shared_textures.into_values().collect(),
         nodes,
     })
-}
-
-/// The folder of nodes of a result, for those who read them.
-pub fn nodes_dir(out: &Path) -> PathBuf {
-    out.join(NODES_DIR)
-}
-
-/// More threads than any machine has cores would only take its memory.
-const MOST_THREADS: usize = 1024;
-
-/// Runs a build on a pool of its own with this many threads; 0 is one per core.
-pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T> {
-    if threads > MOST_THREADS {
-        return Err(Error::Usage(format!("{threads} threads, expected 0 to {MOST_THREADS}")));
-    }
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|error| Error::Usage(format!("{threads} threads cannot be started: {error}")))
-        .map(|pool| pool.install(work))
-}
-
-/// Blocks of an input in parallel, in order.
-pub(super) fn in_parallel<I: Send, O: Send>(
-    items: Vec<I>,
-    work: impl Fn(usize, I) -> Result<O> + Sync,
-) -> Result<Vec<O>> {
-    items.into_par_iter().enumerate().map(|(number, item)| work(number, item)).collect()
 }

@@ -10,7 +10,7 @@ use hlod::builder::cut::split::Chunk;
 use hlod::builder::hierarchy::{
     BlockBuilder, HierarchyOptions, NodeDraft, NodeSink, Resolutions, Tree,
 };
-use hlod::builder::simplify::ladder::LadderStep;
+use hlod::builder::simplify::simplified::LadderStep;
 use hlod::lattice::Lattice;
 use hlod::mesh::{Mesh, PositionKey, key};
 pub use hlod::random::Random;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use hlod::builder::BuildOptions;
 use hlod::builder::hierarchy::HierarchyOptions;
-use hlod::builder::pipeline::with_threads;
+use hlod::builder::threads::with_threads;
 use hlod::texture::Seams;
 
 use crate::support::result::{difference, lasting};

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use hlod::builder::pipeline::with_threads;
+use hlod::builder::threads::with_threads;
 use hlod::city::CityOptions;
 use hlod::format::attributes::{TEXTURED_WEIGHT, attributes};
 use hlod::format::{

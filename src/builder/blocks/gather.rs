@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::builder::blocks::plan::Division;
+use crate::builder::blocks::block_plan::Division;
 use crate::builder::border::chain::{Chain, CutPlane, KeepRule};
 use crate::builder::border::vertex::{Border, Path};
 use crate::builder::cut::plane::{Region, best_plane};

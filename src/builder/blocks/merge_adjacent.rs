@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::builder::blocks::plan::{BlockPlan, Division};
+use crate::builder::blocks::block_plan::{BlockPlan, Division};
 use crate::builder::border::shared::{Bounds, bounds_of, each_shared};
 use crate::mesh::{Model, Part};
 

@@ -5,6 +5,7 @@
 //! those of one surface ([`crate::builder::blocks::merge_adjacent`]); where there are no groups, or one is huge, the mesh is
 //! cut, exactly as nodes are (see [`crate::builder::cut::split`]).
 
+use crate::builder::blocks::block_plan::{BlockPlan, Division};
 use crate::builder::blocks::merge_adjacent::merge_adjacent;
 use crate::mesh::{Model, UpAxis};
 
@@ -61,36 +62,6 @@ const DIVIDED_BUDGETS: usize = 128;
 /// A block that shares more vertices with others than a root's budget divided by this is made one
 /// with them: all of them are there at every level.
 const WELDED: usize = 8;
-
-/// A block before its geometry is gathered.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BlockPlan {
-    /// For people: the group's name, or that of the first of several.
-    pub name: String,
-    /// Indices into [`Model::parts`].
-    pub parts: Vec<usize>,
-    /// How it is divided further, if it is.
-    pub divide: Division,
-}
-
-/// How a planned block is cut into several.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Division {
-    /// It stays whole.
-    Whole,
-    /// Halved until no chunk has more triangles than this.
-    Halves {
-        /// Triangles.
-        most: usize,
-    },
-    /// Cut along the lines of a grid of this side in metres, on these two axes.
-    Grid {
-        /// Metres.
-        metres: f64,
-        /// The horizontal axes.
-        axes: [usize; 2],
-    },
-}
 
 /// Facts of a group that planning needs.
 struct GroupFacts {

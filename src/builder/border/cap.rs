@@ -14,7 +14,7 @@ use crate::builder::border::rank::SurfaceQuadric;
 use crate::builder::border::span::{BorderSpan, edges_of};
 use crate::builder::border::thin::EdgeKey;
 use crate::builder::border::vertex::{Border, Path};
-use crate::builder::simplify::ladder::Simplified;
+use crate::builder::simplify::simplified::Simplified;
 use crate::mesh::{Mesh, PositionKey, Triangulator, key};
 
 /// A mesh that has vertices of the border, and what is known of them.
@@ -182,7 +182,7 @@ mod tests {
     use crate::builder::border::chain::{Chain, CutPlane};
     use crate::builder::border::span::original_spans;
     use crate::builder::simplify::compact::compact;
-    use crate::builder::simplify::ladder::LadderStep;
+    use crate::builder::simplify::simplified::LadderStep;
 
     /// The half of a house behind the plane x = 0, 5 wide and 3 high with a ridge at 5, and a
     /// triangle apart.

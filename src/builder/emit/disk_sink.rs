@@ -3,7 +3,8 @@
 use crate::builder::border::skirt;
 use crate::builder::hierarchy::{NodeDraft, NodeSink};
 use crate::builder::progress::Progress;
-use crate::builder::simplify::ladder::{BUDGET_TOLERANCE, LadderStep};
+use crate::builder::simplify::ladder::BUDGET_TOLERANCE;
+use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::{Stage, Stages};
 use crate::format::attributes::{Attributes, attributes};
 use crate::format::{

@@ -379,6 +379,7 @@ fn a_plane_of_fewer_triangles_is_at_no_distance() {
             weights: AppearanceWeights::default(),
             up: UpAxis::Z,
             reorientable: &[true],
+            without: None,
         };
         let border = Border::interior(plane.positions.len());
         let fewer = simplify(&plane, &border, &Path::default(), 0, target, &method).mesh;

@@ -13,9 +13,8 @@ use crate::builder::border::vertex::{Border, Path};
 use crate::builder::error::{Original, SurfaceError, surface_error};
 use crate::builder::simplify::compact::compact;
 use crate::builder::simplify::fallback::fallback_triangles;
-use crate::builder::simplify::ladder::{
-    AppearanceWeights, LadderStep, Method, Simplified, simplify,
-};
+use crate::builder::simplify::ladder::{AppearanceWeights, Method, simplify};
+use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::builder::simplify::weld_seams::weld_seams;
 use crate::builder::stages::Stage;
 use crate::mesh::{Mesh, all_differ};
@@ -137,6 +136,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             weights,
             up: self.up,
             reorientable: self.reorientable,
+            without: self.options.without,
         };
         let mut result = simplify(&mesh, &border, path, at, target, &method);
         if self.quantization.is_some() {

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::builder::border::skirt::Skirt;
 use crate::builder::error::SurfaceError;
-use crate::builder::simplify::ladder::LadderStep;
+use crate::builder::simplify::simplified::LadderStep;
 use crate::mesh::Mesh;
 use crate::texture::BakeReason;
 

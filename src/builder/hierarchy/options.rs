@@ -2,6 +2,7 @@
 
 use crate::builder::cut::split::CutTolerance;
 use crate::builder::simplify::ladder::{AppearanceWeights, Simplifier};
+use crate::builder::simplify::simplified::LadderStep;
 use crate::texture::Seams;
 
 /// What a coarse node is simplified from.
@@ -69,6 +70,9 @@ pub struct HierarchyOptions {
     pub seams: Seams,
     /// See [`CutTolerance`].
     pub tolerance: CutTolerance,
+    /// A step of the ladder that is not tried, to measure what it is worth; a result does not say
+    /// so.
+    pub without: Option<LadderStep>,
 }
 
 impl Default for HierarchyOptions {
@@ -83,6 +87,7 @@ impl Default for HierarchyOptions {
             weights: AppearanceWeights::default(),
             seams: Seams::default(),
             tolerance: CutTolerance::default(),
+            without: None,
         }
     }
 }

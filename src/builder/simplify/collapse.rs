@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 
 use crate::builder::border::vertex::Border;
 use crate::builder::simplify::compact::compact;
-use crate::builder::simplify::ladder::{LadderStep, Simplified};
+use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::builder::simplify::split_mixed::split_mixed_triangles;
 use crate::mesh::{Mesh, PositionKey, key};
 

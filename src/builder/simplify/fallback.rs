@@ -2,7 +2,7 @@
 
 use crate::builder::border::vertex::Border;
 use crate::builder::simplify::compact::compact;
-use crate::builder::simplify::ladder::{LadderStep, Simplified};
+use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::mesh::Mesh;
 
 /// The largest `most` triangles of a mesh, at least one, in their order.

@@ -26,6 +26,7 @@ pub use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::builder::simplify::collapse::collapse;
 use crate::builder::simplify::compact::compact;
 use crate::builder::simplify::orient::{has_duplicate_faces, oriented};
+use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::mesh::{Mesh, UpAxis};
 
 /// Which method makes the coarse levels.
@@ -41,62 +42,8 @@ pub enum Simplifier {
     Clustering,
 }
 
-/// The step of the ladder that gave a node its triangles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum LadderStep {
-    /// The chunk as it is: a leaf.
-    Original,
-    /// Edge collapse inside texture seams.
-    Collapse,
-    /// Edge collapse across texture seams.
-    Permissive,
-    /// Edge collapse across texture seams and material borders.
-    Across,
-    /// Edge collapse across texture seams and material borders, with the smallest separate parts left out.
-    Prune,
-    /// Edge collapse across texture seams and material borders of faces that wind one way.
-    Oriented,
-    /// Vertex clustering.
-    Clustering,
-    /// Boxes in place of small separate bodies, and edge collapse of the rest.
-    Boxes,
-    /// The largest triangles alone, where simplification would leave nothing.
-    Fallback,
-}
-
-impl LadderStep {
-    /// For reports.
-    pub fn describe(self) -> &'static str {
-        match self {
-            Self::Original => "original geometry",
-            Self::Collapse => "edge collapse within texture seams",
-            Self::Permissive => "edge collapse across texture seams",
-            Self::Across => "edge collapse across material borders",
-            Self::Prune => "edge collapse without the smallest separate parts",
-            Self::Oriented => "edge collapse of faces turned one way",
-            Self::Clustering => "vertex clustering",
-            Self::Boxes => "boxes for small separate bodies",
-            Self::Fallback => "the largest triangles alone",
-        }
-    }
-}
-
 /// A node may exceed its budget by this factor before the ladder goes on.
 pub const BUDGET_TOLERANCE: f64 = 1.1;
-
-/// A simplified chunk.
-#[derive(Clone, Debug)]
-pub struct Simplified {
-    /// Its geometry, with source texture coordinates.
-    pub mesh: Mesh,
-    /// Border facts of its vertices.
-    pub border: Border,
-    /// An upper estimate of the distance that it moved from the input, metres.
-    pub error: f64,
-    /// How it was made.
-    pub step: LadderStep,
-}
 
 /// How chunks are simplified.
 #[derive(Clone, Copy, Debug)]
@@ -109,6 +56,8 @@ pub struct Method<'a> {
     pub up: UpAxis,
     /// Of each material, whether its faces may turn ([`crate::builder::simplify::orient`]).
     pub reorientable: &'a [bool],
+    /// A step that is not tried, to measure what it is worth.
+    pub without: Option<LadderStep>,
 }
 
 /// Edge collapse that moves the surface by more than this share of the side of a square as large as
@@ -127,7 +76,8 @@ pub fn simplify(
     target: usize,
     method: &Method,
 ) -> Simplified {
-    let &Method { simplifier, weights, up, reorientable } = method;
+    let &Method { simplifier, weights, up, reorientable, without } = method;
+    let tries = |step| without != Some(step);
     let (mesh, border) = compact(mesh, border);
     let locked: Vec<bool> = border
         .planes
@@ -144,9 +94,12 @@ pub fn simplify(
         return source;
     }
     let collapsed = |step| collapse(&source.mesh, &source.border, &locked, target, step, weights);
-    let boxes = boxes(&source, &locked, up, target, weights);
+    let boxes = match tries(LadderStep::Boxes) {
+        true => boxes(&source, &locked, up, target, weights),
+        false => None,
+    };
     let mut best = collapsed(LadderStep::Collapse);
-    if best.mesh.triangles.len() > limit {
+    if best.mesh.triangles.len() > limit && tries(LadderStep::Permissive) {
         let permissive = collapsed(LadderStep::Permissive);
         if permissive.mesh.triangles.len() < best.mesh.triangles.len() {
             best = permissive;
@@ -158,12 +111,18 @@ pub fn simplify(
         || best.error > doubtful
         || has_duplicate_faces(&source.mesh)
     {
-        if has_seams(&source.mesh) {
+        if has_seams(&source.mesh) && tries(LadderStep::Across) {
             candidates.push(collapsed(LadderStep::Across));
         }
-        candidates.push(collapsed(LadderStep::Prune));
-        candidates.push(clustered(&source.mesh, &source.border, &locked, target));
-        candidates.extend(wound(&source, &locked, target, weights, reorientable));
+        if tries(LadderStep::Prune) {
+            candidates.push(collapsed(LadderStep::Prune));
+        }
+        if tries(LadderStep::Clustering) {
+            candidates.push(clustered(&source.mesh, &source.border, &locked, target));
+        }
+        if tries(LadderStep::Oriented) {
+            candidates.extend(wound(&source, &locked, target, weights, reorientable));
+        }
     }
     candidates.extend(boxes);
     if candidates.is_empty() {
@@ -328,7 +287,7 @@ mod tests {
         let simplified = |target| {
             let weights = AppearanceWeights::default();
             let (simplifier, up, reorientable) = (Simplifier::Qem, UpAxis::Z, &[true][..]);
-            let method = Method { simplifier, weights, up, reorientable };
+            let method = Method { simplifier, weights, up, reorientable, without: None };
             simplify(&mesh, &border, &Path::default(), 0, target, &method)
         };
         let few = simplified(600);

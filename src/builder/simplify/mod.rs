@@ -8,5 +8,6 @@ pub mod fallback;
 pub mod ladder;
 pub mod merge;
 pub mod orient;
+pub mod simplified;
 pub mod split_mixed;
 pub mod weld_seams;

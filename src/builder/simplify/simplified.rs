@@ -1,0 +1,58 @@
+//! What simplification gives.
+
+use crate::builder::border::vertex::Border;
+use crate::mesh::Mesh;
+
+/// A simplified chunk.
+#[derive(Clone, Debug)]
+pub struct Simplified {
+    /// Its geometry, with source texture coordinates.
+    pub mesh: Mesh,
+    /// Border facts of its vertices.
+    pub border: Border,
+    /// An upper estimate of the distance that it moved from the input, metres.
+    pub error: f64,
+    /// How it was made.
+    pub step: LadderStep,
+}
+
+/// The step of the ladder that gave a node its triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LadderStep {
+    /// The chunk as it is: a leaf.
+    Original,
+    /// Edge collapse inside texture seams.
+    Collapse,
+    /// Edge collapse across texture seams.
+    Permissive,
+    /// Edge collapse across texture seams and material borders.
+    Across,
+    /// Edge collapse across texture seams and material borders, with the smallest separate parts left out.
+    Prune,
+    /// Edge collapse across texture seams and material borders of faces that wind one way.
+    Oriented,
+    /// Vertex clustering.
+    Clustering,
+    /// Boxes in place of small separate bodies, and edge collapse of the rest.
+    Boxes,
+    /// The largest triangles alone, where simplification would leave nothing.
+    Fallback,
+}
+
+impl LadderStep {
+    /// For reports.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Original => "original geometry",
+            Self::Collapse => "edge collapse within texture seams",
+            Self::Permissive => "edge collapse across texture seams",
+            Self::Across => "edge collapse across material borders",
+            Self::Prune => "edge collapse without the smallest separate parts",
+            Self::Oriented => "edge collapse of faces turned one way",
+            Self::Clustering => "vertex clustering",
+            Self::Boxes => "boxes for small separate bodies",
+            Self::Fallback => "the largest triangles alone",
+        }
+    }
+}
