@@ -116,7 +116,7 @@ struct BuildArgs {
     #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Hierarchy")]
     level_factor: u32,
     /// Target number of triangles in a node, 1 or more. More: fewer, larger files
-    #[arg(long, value_name = "N", default_value_t = 900, help_heading = "Hierarchy")]
+    #[arg(long, value_name = "N", default_value_t = 2000, help_heading = "Hierarchy")]
     desired_tris: u32,
     /// How coarse nodes are simplified
     #[arg(long, value_enum, default_value_t = SimplifierArg::Qem, help_heading = "Hierarchy")]

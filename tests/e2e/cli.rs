@@ -55,7 +55,7 @@ fn help_names_every_option_with_its_unit_and_range() {
         "2-64",
         "[default: 4]",
         "1 or more",
-        "[default: 900]",
+        "[default: 2000]",
         "qem",
         "clustering",
         "original",

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use hlod::builder::BuildOptions;
 use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
-use hlod::builder::pipeline::with_threads;
 use hlod::builder::simplify::ladder::Simplifier;
+use hlod::builder::threads::with_threads;
 
 use crate::support::inputs::{small_city, write_city, write_soup, write_street};
 use crate::support::result::{difference, lasting};
@@ -76,7 +76,9 @@ fn the_program_agrees_with_itself_whatever_threads_it_is_given() {
     let folder = tempfile::tempdir().unwrap();
     write_city(folder.path(), &small_city());
     let result = |threads: &str| {
-        run_build(folder.path(), &["--threads", threads, "--force", "city.obj", "out"]);
+        let size = ["--desired-tris", "250", "--force"];
+        let arguments = [&["--threads", threads][..], &size, &["city.obj", "out"]].concat();
+        run_build(folder.path(), &arguments);
         lasting(&folder.path().join("out"))
     };
     let one = result("1");

@@ -11,7 +11,7 @@ use crate::support::build_with;
 use crate::support::geometry::area;
 use crate::support::result::{Built, report};
 
-const DESIRED_TRIS: u64 = 900;
+const DESIRED_TRIS: u64 = 2000;
 
 /// The data, or `None`, said once a set.
 fn data(set: &str) -> Option<PathBuf> {

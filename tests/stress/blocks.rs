@@ -46,7 +46,7 @@ fn row(pieces: usize) -> Shape {
 #[test]
 fn blocks_of_any_size_and_shape() {
     let mut table = Table::new("7-blocks", "Blocks and trees of odd sizes");
-    let default = BuildOptions { up: options().up, ..BuildOptions::default() };
+    let default = tree(900, 4);
     let mut check =
         |name: &str, case: &Chain, of: &Chain, twin: &str, bounds: Bounds, why: &str| {
             table.verified(name, case.failures());
@@ -71,7 +71,7 @@ fn blocks_of_any_size_and_shape() {
             shape.triangle([at(25.0, 0.0), at(26.0, 0.0), at(25.0, 1.0)]);
         }
         // A balanced tree would make a leaf of twice as many.
-        let hierarchy = HierarchyOptions { tree: TreeShape::Thesis, ..HierarchyOptions::default() };
+        let hierarchy = HierarchyOptions { tree: TreeShape::Thesis, ..default.hierarchy.clone() };
         chain(&shape, &BuildOptions { hierarchy, ..default.clone() })
     };
     assert_eq!(square(0).built.scene.nodes.len(), 1, "900 triangles are one node");

@@ -79,7 +79,7 @@ impl Default for HierarchyOptions {
     fn default() -> Self {
         Self {
             tree: TreeShape::default(),
-            desired_tris: 900,
+            desired_tris: 2000,
             level_factor: 4,
             simplify_from: SimplifyFrom::default(),
             simplifier: Simplifier::default(),
