@@ -20,7 +20,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let without = match step.as_str() {
         "nothing" => None,
         "permissive" => Some(LadderStep::Permissive),
-        "across" => Some(LadderStep::Across),
         "prune" => Some(LadderStep::Prune),
         "oriented" => Some(LadderStep::Oriented),
         "clustering" => Some(LadderStep::Clustering),

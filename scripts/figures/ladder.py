@@ -13,7 +13,6 @@ from common import DOCS, Options, Programs, machine, real_data, say, table, writ
 STEPS = {
     "collapse": "edge collapse within texture seams",
     "permissive": "edge collapse across texture seams",
-    "across": "edge collapse across material borders",
     "prune": "edge collapse without the smallest separate parts",
     "oriented": "edge collapse of faces turned one way",
     "clustering": "vertex clustering",

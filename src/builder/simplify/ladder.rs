@@ -5,9 +5,8 @@
 //! 2. The same, allowed to collapse across texture seams but not across material borders.
 //! 3. Where that misses the budget, or moves the surface far for the triangles that it leaves,
 //!    whichever of these and it is measured to stay nearest to the input on average:
-//!    - the same, across material borders too; triangles then get one material each again
-//!      ([`crate::builder::simplify::split_mixed`]);
-//!    - the same, also leaving out the smallest separate parts;
+//!    - the same, across material borders too, and leaving out the smallest separate parts; triangles
+//!      then get one material each again ([`crate::builder::simplify::split_mixed`]);
 //!    - the same as the first, of faces that wind one way ([`crate::builder::simplify::orient`]);
 //!    - vertex clustering ([`crate::builder::simplify::cluster`]), which has no topology to respect.
 //!
@@ -111,9 +110,6 @@ pub fn simplify(
         || best.error > doubtful
         || has_duplicate_faces(&source.mesh)
     {
-        if has_seams(&source.mesh) && tries(LadderStep::Across) {
-            candidates.push(collapsed(LadderStep::Across));
-        }
         if tries(LadderStep::Prune) {
             candidates.push(collapsed(LadderStep::Prune));
         }
@@ -181,13 +177,6 @@ impl Rank {
     }
 }
 
-/// Whether vertices may differ in more than their place.
-fn has_seams(mesh: &Mesh) -> bool {
-    !mesh.texcoords.is_empty()
-        || !mesh.colors.is_empty()
-        || mesh.materials.windows(2).any(|pair| pair[0] != pair[1])
-}
-
 /// Edge collapse of faces that wind one way, each there once; `None` where they do already.
 fn wound(
     source: &Simplified,
@@ -219,7 +208,7 @@ fn boxes(
     let rest = Mesh { triangles: rest, ..source.mesh.clone() };
     let mut result = if rest.triangles.len() > for_rest {
         // Nothing is left out here: that is for small bodies, which are boxes.
-        collapse(&rest, &source.border, locked, for_rest, LadderStep::Across, weights)
+        collapse(&rest, &source.border, locked, for_rest, LadderStep::Boxes, weights)
     } else {
         let (mesh, border) = compact(&rest, &source.border);
         Simplified { mesh, border, error: 0.0, step: LadderStep::Collapse }
@@ -299,7 +288,7 @@ mod tests {
             &border,
             &vec![false; mesh.positions.len()],
             600,
-            LadderStep::Across,
+            LadderStep::Boxes,
             AppearanceWeights::default(),
         );
         let to = |other: &Mesh| MeanDistance::from(&mesh).to(other, f64::INFINITY);

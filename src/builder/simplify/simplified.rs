@@ -26,8 +26,6 @@ pub enum LadderStep {
     Collapse,
     /// Edge collapse across texture seams.
     Permissive,
-    /// Edge collapse across texture seams and material borders.
-    Across,
     /// Edge collapse across texture seams and material borders, with the smallest separate parts left out.
     Prune,
     /// Edge collapse across texture seams and material borders of faces that wind one way.
@@ -47,7 +45,6 @@ impl LadderStep {
             Self::Original => "original geometry",
             Self::Collapse => "edge collapse within texture seams",
             Self::Permissive => "edge collapse across texture seams",
-            Self::Across => "edge collapse across material borders",
             Self::Prune => "edge collapse without the smallest separate parts",
             Self::Oriented => "edge collapse of faces turned one way",
             Self::Clustering => "vertex clustering",
