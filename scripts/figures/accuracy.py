@@ -28,8 +28,7 @@ VARIANTS = [
     ("borders locked", ["--borders", "locked"]),
     ("seams kept", ["--seams", "keep"]),
     ("all seams baked", ["--seams", "bake"]),
-    ("300 triangles a node", ["--desired-tris", "300"]),
-    ("2,000 triangles a node", ["--desired-tris", "2000"]),
+    ("900 triangles a node", ["--desired-tris", "900"]),
     ("5,000 triangles a node", ["--desired-tris", "5000"]),
 ]
 UTM = "678016,5403456,400"
