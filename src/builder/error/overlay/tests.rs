@@ -8,7 +8,7 @@ const SIDE: u32 = 12;
 
 /// A sheet of 11 by 11 squares, each cut in two, that waves a little.
 fn sheet() -> Mesh {
-    let wave = |x: u32, y: u32| 0.05 * f32::from((x * 7 + y * 5) as u16 % 4 != 0);
+    let wave = |x: u32, y: u32| if (x * 7 + y * 5).is_multiple_of(4) { 0.0 } else { 0.05 };
     let positions: Vec<[f32; 3]> = (0..SIDE * SIDE)
         .map(|at| (at % SIDE, at / SIDE))
         .map(|(x, y)| [x as f32, y as f32, wave(x, y)])
