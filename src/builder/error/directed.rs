@@ -146,7 +146,9 @@ impl<'a> Directed<'a> {
 
     /// With what the way back has told. The surface it goes to must be of one mesh.
     pub fn with_marks(self, marks: Marks) -> Self {
-        Self { marks: Some(marks), ..self }
+        let settled = self.largest.settled.max(marks.farthest);
+        let largest = Largest { settled, ..self.largest };
+        Self { marks: Some(marks), largest, ..self }
     }
 
     /// Raises the largest distance to what it is, or to what the budget can say; also what was

@@ -3,6 +3,7 @@
 //! - [`Original`]: a surface that is searched, of one mesh or of several
 //! - `bvh`, `triangle`: its hierarchy, and eight triangles at a time
 //! - `directed`, `polygon`: the bound on the largest distance, one way
+//! - `overlay`, `adjacency`: proving that a triangle is near by walking over the other surface
 //! - `samples`: points for the mean, and [`MeanDistance`] to choose among meshes by it
 
 mod adjacency;

@@ -64,6 +64,8 @@ pub(super) struct Marks {
     firsts: Vec<usize>,
     /// Of each slot, which walk visited it last, and what is known.
     slots: Vec<(u32, Mark)>,
+    /// No point of a triangle that is marked as settled is farther.
+    pub farthest: f32,
 }
 
 impl Marks {
@@ -75,7 +77,7 @@ impl Marks {
             first
         });
         let firsts = firsts.collect();
-        Self { firsts, slots: vec![(0, Mark::NONE); count] }
+        Self { firsts, slots: vec![(0, Mark::NONE); count], farthest: 0.0 }
     }
 
     /// Of a triangle.
@@ -142,6 +144,10 @@ impl<'a> Overlay<'a> {
             if *mark != Mark::SETTLED {
                 if seen.is_near(&base, most) {
                     *mark = Mark::SETTLED;
+                    // Also where the walk fails, and its bound counts for nothing.
+                    let height = seen.height.abs().max_element() + margin;
+                    let farthest = min(limit, height.hypot(limit * ASIDE));
+                    self.marks.farthest = max(self.marks.farthest, farthest);
                 } else if *mark == Mark::NONE || seen.is_centred() {
                     *mark = Mark::near(slot);
                 }

@@ -101,3 +101,23 @@ fn what_stands_out_is_too_far() {
     beside.positions[(SIDE * SIDE - 1) as usize][2] = 0.6;
     assert!(bounds(&Original::of(&beside)).iter().any(Option::is_some));
 }
+
+/// A walk that fails may have settled triangles on its way, whose distance must count.
+#[test]
+fn what_failed_walks_settle_counts() {
+    let mut torn = sheet();
+    torn.triangles.truncate(torn.triangles.len() * 2 / 3);
+    let original = Original::of(&torn);
+    let large = [[1.2, 1.1, 0.0], [9.7, 2.3, 0.0], [4.1, 9.4, 0.0]];
+    let large = Triangle::new(large.map(Vec3::from));
+    let mut overlay = Overlay::new(&original);
+    for (leaf, &count) in (0..).zip(&original.parts[0].bvh.counts) {
+        for lane in 0..count.into() {
+            let start = TriangleId { part: 0, leaf, lane };
+            assert_eq!(overlay.bound(&large, 0, start, 0.5, 1e-5), None);
+        }
+    }
+    let marks = overlay.into_marks();
+    assert!(marks.slots.iter().any(|(_, mark)| mark.is_settled()));
+    assert!((0.05..=0.5).contains(&marks.farthest), "{}", marks.farthest);
+}
