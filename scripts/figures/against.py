@@ -12,6 +12,7 @@ from common import (
     DOCS,
     ROOT,
     Options,
+    REAL,
     Programs,
     machine,
     real_data,
@@ -22,16 +23,6 @@ from common import (
 
 # Before trees were balanced, errors were bounds and nodes had 2,000 triangles.
 COMMIT = "29fd983"
-SETS = [
-    "sceaux",
-    "oblique_a",
-    "ingolstadt",
-    "torcs_street1",
-    "hamada",
-    "wageningen",
-    "lyon_roads",
-    "3dfier",
-]
 
 
 def main():
@@ -71,7 +62,7 @@ def inputs(programs, arguments):
     yield "the same, 10,000", usual, ["--desired-tris", "10000"]
     yield "city, 1 M, 105 texels", [programs.city("against-105", **city, texels_per_triangle=105)], []
     if not arguments.no_real:
-        for name in SETS:
+        for name in REAL:
             if models := real_data(name):
                 yield f"`{name}`", models, []
 

@@ -9,6 +9,7 @@ from common import (
     DOCS,
     ROOT,
     Options,
+    REAL,
     Programs,
     machine,
     quantity,
@@ -24,16 +25,6 @@ TRIANGLES_PER_BLOCK = 80_000
 TEXELS = 17
 # Of the thesis's data.
 THESIS_TEXELS = 105
-REAL = [
-    "sceaux",
-    "oblique_a",
-    "ingolstadt",
-    "torcs_street1",
-    "hamada",
-    "wageningen",
-    "lyon_roads",
-    "3dfier",
-]
 STAGES = ["compare", "import", "gather", "pictures", "cut", "simplify", "measure", "atlas", "write"]
 
 

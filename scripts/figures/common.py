@@ -16,6 +16,18 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS = ROOT / "docs"
 DATA = Path(os.environ.get("HLOD_DATA", ROOT.parent / "shared" / "data"))
 
+# Real data that builds are timed on.
+REAL = [
+    "sceaux",
+    "oblique_a",
+    "ingolstadt",
+    "torcs_street1",
+    "hamada",
+    "wageningen",
+    "lyon_roads",
+    "3dfier",
+]
+
 
 class Options(argparse.ArgumentParser):
     """The options of a script that writes its figures into the pages of docs/.
