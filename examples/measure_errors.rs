@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use hlod::builder::blocks::gather::gather;
 use hlod::builder::border::vertex::{self, Border};
+use hlod::builder::constants::Constants;
 use hlod::builder::error::{Original, measure};
 use hlod::builder::simplify::ladder::{AppearanceWeights, Method, Simplifier, simplify};
 use hlod::mesh::{Mesh, UpAxis};
@@ -38,12 +39,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         divide(mesh, most.parse()?, &mut chunks);
         let reorientable = vec![false; model.materials.len()];
         for ratio in [4, 16, 64] {
+            let constants = Constants::default();
             let method = Method {
                 simplifier: Simplifier::Qem,
                 weights: AppearanceWeights::default(),
                 up: model.up.unwrap_or(UpAxis::Z),
                 reorientable: &reorientable,
                 without: None,
+                constants: &constants,
             };
             let (mut made, mut measured) = (Duration::ZERO, Duration::ZERO);
             let (mut triangles, mut exhausted, mut tightness) = (0, 0, Vec::new());
@@ -53,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let path = vertex::Path::default();
                 let simplified = simplify(chunk, &border, &path, 0, target, &method).mesh;
                 let begin = Instant::now();
-                let original = Original::of(chunk);
+                let original = Original::of(chunk, constants.measure);
                 made += begin.elapsed();
                 let begin = Instant::now();
                 let result = measure(&original, &simplified);

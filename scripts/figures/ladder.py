@@ -9,7 +9,7 @@ import subprocess
 
 from common import DOCS, Options, Programs, machine, real_data, say, table, write_between_markers
 
-# The names that examples/build_without.rs knows, and what build.json calls them.
+# The names that examples/build_with.rs knows, and what build.json calls them.
 STEPS = {
     "collapse": "edge collapse within texture seams",
     "permissive": "edge collapse across texture seams",
@@ -37,7 +37,7 @@ SAMPLES = 100_000
 def main():
     quick = "two sets, two steps"
     arguments = Options("ladder", __doc__, quick, ("the fastest of how many builds", 1)).parse()
-    programs = Programs(examples=["build_without"])
+    programs = Programs(examples=["build_with"])
     wins, losses = [], []
     steps = list(STEPS)[1:]
     for name in SETS[3:5] if arguments.quick else SETS:
@@ -45,13 +45,13 @@ def main():
         if not models:
             continue
         say(f"{name}: all steps")
-        whole = measured(programs, models, "nothing", arguments.runs)
+        whole = measured(programs, models, {}, arguments.runs)
         counts = whole["counts"]
         wins.append([f"`{name}`"] + [str(counts.get(text, 0)) for text in STEPS.values()])
         row = [f"`{name}`", f"{whole['seconds']:.2f}"]
         for step in steps[-2:] if arguments.quick else steps:
             say(f"{name}: without {step}")
-            row.append(compared(measured(programs, models, step, arguments.runs), whole))
+            row.append(compared(measured(programs, models, {"without": step}, arguments.runs), whole))
         losses.append(row)
     head = ["", "seconds", *(f"without {step}" for step in steps)]
     if arguments.quick:
@@ -73,13 +73,13 @@ def main():
         write_between_markers(DOCS / "ladder.md", "figures", text)
 
 
-def measured(programs, models, without, runs):
+def measured(programs, models, changes, runs):
     out = programs.work / f"ladder-{os.getpid()}"
     seconds = math.inf
     for _ in range(runs):
         shutil.rmtree(out, ignore_errors=True)
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        command = [programs.path("examples/build_without"), without, *map(str, models), str(out)]
+        command = [programs.path("examples/build_with"), json.dumps(changes), *map(str, models), str(out)]
         subprocess.run(command, check=True)
         seconds = min(seconds, resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
     report = json.loads((out / "build.json").read_text())

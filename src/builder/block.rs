@@ -16,7 +16,7 @@ use crate::builder::border::shared::{
 };
 use crate::builder::cut::split::Chunk;
 use crate::builder::emit::disk_sink::{DiskSink, NodeRecord};
-use crate::builder::hierarchy::{BlockBuilder, Resolutions, Tree};
+use crate::builder::hierarchy::{BlockBuilder, HierarchyOptions, Resolutions, Tree};
 use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
 use crate::builder::simplify::orient::reorientable;
@@ -131,7 +131,8 @@ pub fn build_input(
         progress.built(collapsed);
     }
     merge_untextured(&mut model);
-    let plans = plan(&model, options.blocks, options.hierarchy.desired_tris, up);
+    let HierarchyOptions { desired_tris, constants, .. } = &options.hierarchy;
+    let plans = plan(&model, options.blocks, *desired_tris, up, &constants.blocks);
     let texture_plan = TexturePlan::new(&model);
     let drafts = drafts(&mut model, plans, options, stages);
     let lattice_of = |drafts: &mut dyn Iterator<Item = &Draft>| {
@@ -320,7 +321,8 @@ fn drafts_of_plan(
     // The blocks' own factors are not known yet; those of the largest serve all.
     let resolutions = Resolutions::new(most.min(chunk.mesh.triangles.len()), &options.hierarchy);
     let shares: Vec<f64> = resolutions.factors().iter().map(|factor| 1.0 / factor.sqrt()).collect();
-    let chunks = divide(chunk, division, &shares, options.quantization(), stages);
+    let constants = &options.hierarchy.constants;
+    let chunks = divide(chunk, division, &shares, options.quantization(), constants, stages);
     let several = chunks.len() > 1;
     for (number, chunk) in chunks.into_iter().enumerate() {
         let materials = materials_of(chunk.mesh.materials.clone());

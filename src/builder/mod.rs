@@ -8,10 +8,12 @@
 //! - [`simplify`]: bringing a node to its triangle budget
 //! - [`error`]: the distance between a node and the original
 //! - [`emit`]: nodes as files
+//! - [`constants`]: what was chosen by measuring
 
 pub mod block;
 pub mod blocks;
 pub mod border;
+pub mod constants;
 pub mod cut;
 pub mod emit;
 pub mod error;

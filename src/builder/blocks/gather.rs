@@ -7,6 +7,7 @@ use rustc_hash::FxHashMap;
 use crate::builder::blocks::block_plan::Division;
 use crate::builder::border::chain::{Chain, CutPlane, KeepRule};
 use crate::builder::border::vertex::{Border, Path};
+use crate::builder::constants::Constants;
 use crate::builder::cut::plane::{Region, best_plane};
 use crate::builder::cut::split::{Chunk, Cut, CutTolerance, cut};
 use crate::builder::cut::uncut::UncutComponents;
@@ -66,6 +67,7 @@ pub fn divide(
     division: Division,
     shares: &[f64],
     quantization: Option<Quantization>,
+    constants: &Constants,
     stages: &Stages,
 ) -> Vec<Chunk<f64>> {
     let lattice = quantization.map(|Quantization { step }| Lattice { step });
@@ -75,11 +77,12 @@ pub fn divide(
         first_level: 0,
         collinear: 0.0,
         baked: None,
+        constants: constants.border,
     };
     let mut done = Vec::new();
     match division {
         Division::Whole => done.push(chunk),
-        Division::Halves { most } => return halves(chunk, most, &rule, lattice, stages),
+        Division::Halves { most } => return halves(chunk, most, &rule, lattice, constants, stages),
         Division::Grid { metres, axes } => {
             let mut stack = vec![chunk];
             while let Some(chunk) = stack.pop() {
@@ -105,15 +108,13 @@ pub fn divide(
     done
 }
 
-/// A separate body with more than this share of a block's triangles is cut.
-const BODIES_PER_BLOCK: usize = 32;
-
 /// Halves a chunk ([`crate::builder::cut::axis`]) until no part of it has more than `most` triangles.
 fn halves(
     chunk: Chunk<f64>,
     most: usize,
     rule: &KeepRule,
     lattice: Option<Lattice>,
+    constants: &Constants,
     stages: &Stages,
 ) -> Vec<Chunk<f64>> {
     let triangles = chunk.mesh.triangles.len();
@@ -124,15 +125,16 @@ fn halves(
         return vec![chunk];
     };
     let region = Region { low, high, share: 0.5, touching: 0.0 };
-    let plane = stages.time(Stage::Gather, || best_plane(&chunk.mesh, &region));
+    let plane = stages.time(Stage::Gather, || best_plane(&chunk.mesh, &region, &constants.cut));
     let Some((axis, middle)) = plane.filter(|_| chunk.path.len() < 12) else { return vec![chunk] };
     let middle = lattice.map_or(middle, |lattice| lattice.round(middle));
-    let whole = UncutComponents::in_slabs((high[axis] - low[axis]) * 0.5, most / BODIES_PER_BLOCK);
+    let width = (high[axis] - low[axis]) * 0.5;
+    let whole = UncutComponents::in_slabs(width, most / constants.blocks.uncut, &constants.cut);
     let (below, above) =
         stages.time(Stage::Gather, || cut_at(chunk, axis, middle, whole, rule, lattice));
     let (mut done, above) = rayon::join(
-        || halves(below, most, rule, lattice, stages),
-        || halves(above, most, rule, lattice, stages),
+        || halves(below, most, rule, lattice, constants, stages),
+        || halves(above, most, rule, lattice, constants, stages),
     );
     done.extend(above);
     done

@@ -7,6 +7,7 @@
 
 use crate::builder::blocks::block_plan::{BlockPlan, Division};
 use crate::builder::blocks::merge_adjacent::merge_adjacent;
+use crate::builder::constants::BlockConstants;
 use crate::mesh::{Model, UpAxis};
 
 /// How blocks are made.
@@ -49,20 +50,6 @@ impl std::fmt::Display for BlockMode {
     }
 }
 
-/// Groups below this many budgets are tiny: they are merged with tiny neighbours.
-const TINY_BUDGETS: usize = 4;
-/// Merged blocks have at most this many budgets of triangles.
-const MERGED_BUDGETS: usize = 16;
-/// A group above this many budgets is divided (the thesis's blocks have 87 on average).
-const HUGE_BUDGETS: usize = 400;
-/// A file without groups is divided above this many budgets, and so divided chunks have at most
-/// as many.
-const DIVIDED_BUDGETS: usize = 128;
-
-/// A block that shares more vertices with others than a root's budget divided by this is made one
-/// with them: all of them are there at every level.
-const WELDED: usize = 8;
-
 /// Facts of a group that planning needs.
 struct GroupFacts {
     group: usize,
@@ -72,7 +59,14 @@ struct GroupFacts {
 }
 
 /// Plans the blocks of a model.
-pub fn plan(model: &Model, mode: BlockMode, desired_tris: u32, up: UpAxis) -> Vec<BlockPlan> {
+pub fn plan(
+    model: &Model,
+    mode: BlockMode,
+    desired_tris: u32,
+    up: UpAxis,
+    constants: &BlockConstants,
+) -> Vec<BlockPlan> {
+    let &BlockConstants { small_group, merged, large_group, divided, welded, .. } = constants;
     let groups = group_facts(model);
     let name = |group: usize| model.groups[group].name.clone();
     let whole = |facts: &GroupFacts| BlockPlan {
@@ -95,21 +89,21 @@ pub fn plan(model: &Model, mode: BlockMode, desired_tris: u32, up: UpAxis) -> Ve
             }]
         }
         BlockMode::Auto => {
-            let huge = if groups.len() == 1 { DIVIDED_BUDGETS } else { HUGE_BUDGETS } * budget;
+            let large = if groups.len() == 1 { divided } else { large_group } * budget;
             let mut plans: Vec<(usize, BlockPlan)> = Vec::new();
-            let mut tiny = Vec::new();
+            let mut small = Vec::new();
             for facts in groups {
-                if facts.triangles < TINY_BUDGETS * budget && model.groups.len() > 1 {
-                    tiny.push(facts);
+                if facts.triangles < small_group * budget && model.groups.len() > 1 {
+                    small.push(facts);
                 } else {
                     let mut block = whole(&facts);
-                    if facts.triangles > huge {
-                        block.divide = Division::Halves { most: DIVIDED_BUDGETS * budget };
+                    if facts.triangles > large {
+                        block.divide = Division::Halves { most: divided * budget };
                     }
                     plans.push((facts.group, block));
                 }
             }
-            for cluster in merge_tiny(tiny, MERGED_BUDGETS * budget) {
+            for cluster in merge_small(small, merged * budget) {
                 let first = cluster.iter().map(|facts| facts.group).min().unwrap_or(0);
                 let mut parts: Vec<usize> =
                     cluster.iter().flat_map(|facts| facts.parts.iter().copied()).collect();
@@ -119,7 +113,7 @@ pub fn plan(model: &Model, mode: BlockMode, desired_tris: u32, up: UpAxis) -> Ve
             }
             plans.sort_by_key(|(first, _)| *first);
             let plans = plans.into_iter().map(|(_, plan)| plan).collect();
-            merge_adjacent(model, plans, budget / WELDED, MERGED_BUDGETS * budget)
+            merge_adjacent(model, plans, budget / welded, merged * budget)
         }
     }
 }
@@ -151,7 +145,7 @@ fn group_facts(model: &Model) -> Vec<GroupFacts> {
 
 /// Halves the groups along the longest side of their centres, at the middle by triangles, until
 /// no cluster has more than `most` triangles.
-fn merge_tiny(groups: Vec<GroupFacts>, most: usize) -> Vec<Vec<GroupFacts>> {
+fn merge_small(groups: Vec<GroupFacts>, most: usize) -> Vec<Vec<GroupFacts>> {
     let mut clusters = Vec::new();
     let mut stack = vec![groups];
     while let Some(mut groups) = stack.pop() {

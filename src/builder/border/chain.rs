@@ -9,6 +9,7 @@ use glam::DVec3;
 use rustc_hash::FxHashMap;
 
 use crate::builder::border::rank::{Polyline, SurfaceQuadric, removals};
+use crate::builder::constants::BorderConstants;
 use crate::mesh::{Coordinate, PositionKey, key, wide};
 use crate::texture::BakeClasses;
 
@@ -64,6 +65,8 @@ pub struct KeepRule<'a> {
     pub collinear: f64,
     /// The materials whose seams coarse nodes do not have, so that vertices on them may go.
     pub baked: Option<&'a BakeClasses>,
+    /// See [`BorderConstants`].
+    pub constants: BorderConstants,
 }
 
 impl KeepRule<'_> {
@@ -105,7 +108,7 @@ impl<C: Coordinate> CutPlane<C> {
                 surfaces: all.map(|vertex| vertex.surface).collect(),
             }
         };
-        let order = removals(&runs.iter().map(line).collect::<Vec<_>>());
+        let order = removals(&runs.iter().map(line).collect::<Vec<_>>(), &rule.constants);
         let mut chains: Vec<Chain<C>> = runs
             .iter()
             .map(|run| Chain {
@@ -252,6 +255,7 @@ mod tests {
             first_level: 1,
             collinear: 1e-6,
             baked: None,
+            constants: BorderConstants::default(),
         }
     }
 

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::chain::distance_to_segment;
+use super::skirt_rules::SkirtRules;
 use crate::mesh::wide;
 
 /// Rectangles reach this share of their own width beyond the polyline.
@@ -11,16 +12,6 @@ const MARGIN: f64 = 0.02;
 /// Polygons reach so many lattice steps beyond the polyline, along and across: corners are rounded,
 /// and must not come to lie short of its ends.
 const ROUNDING_STEPS: f64 = 2.0;
-
-/// A triangle is taken rather than a rectangle where it is at most so many times as high. With twice
-/// the height it has the rectangle's area.
-const TRIANGLE_HEIGHT: f64 = 2.2;
-
-/// A triangle may stand over the ends of the polyline by at most this share of its length, and so
-/// many times as far as the polyline is off: from the corner of a house a long one would stick out
-/// into the street.
-const TRIANGLE_OVERHANG: f64 = 0.1;
-const TRIANGLE_OVERHANG_HEIGHTS: f64 = 4.0;
 
 /// A polygon over a polyline and its chord.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,12 +25,13 @@ pub(super) struct Cover {
 impl Cover {
     /// The cover of a polyline in the plane across `axis`; `None` where its ends are one, or it has
     /// nothing between them.
-    pub fn of(points: &[[f32; 3]], axis: usize, step: f64) -> Option<Self> {
+    pub fn of(points: &[[f32; 3]], axis: usize, rules: &SkirtRules) -> Option<Self> {
         let [first, _, .., last] = points else { return None };
         if points.len() < 3 {
             return None;
         }
         let frame = Frame::new(wide(*first), wide(*last), axis)?;
+        let SkirtRules { step, constants, .. } = rules;
         let rounding = ROUNDING_STEPS * step;
         // Along and across.
         let flat: Vec<[f64; 2]> = points.iter().map(|&point| frame.flat(wide(point))).collect();
@@ -54,10 +46,10 @@ impl Cover {
             let [a, b, c] = *corners;
             ((c[1] - a[1]).abs(), (b[0] - a[0]).abs())
         };
-        let most = (high - low) * TRIANGLE_HEIGHT + 2.0 * rounding;
+        let most = (high - low) * constants.triangle_height + 2.0 * rounding;
         let length = to - from;
-        let beyond =
-            (TRIANGLE_OVERHANG * length).min(TRIANGLE_OVERHANG_HEIGHTS * (high - low + rounding));
+        let by_height = constants.overhang_heights * (high - low + rounding);
+        let beyond = (constants.overhang * length).min(by_height);
         let overhang = length + 2.0 * beyond;
         let best = [above, below]
             .into_iter()
@@ -156,9 +148,13 @@ mod tests {
 
     const STEP: f64 = 1e-6;
 
+    fn rules() -> SkirtRules {
+        SkirtRules { step: STEP, closed: STEP, constants: Default::default() }
+    }
+
     fn cover(points: &[[f32; 2]]) -> Cover {
         let points: Vec<[f32; 3]> = points.iter().map(|&[y, z]| [0.0, y, z]).collect();
-        let cover = Cover::of(&points, 0, STEP).unwrap();
+        let cover = Cover::of(&points, 0, &rules()).unwrap();
         for (at, &point) in points.iter().enumerate() {
             assert!(contains(&cover, point), "{at} of {points:?} is outside of {cover:?}");
         }
@@ -227,8 +223,8 @@ mod tests {
 
     #[test]
     fn nothing_is_covered_between_one_place_or_along_an_edge() {
-        assert_eq!(Cover::of(&[[0.0; 3], [0.0, 1.0, 0.0]], 0, STEP), None);
-        assert_eq!(Cover::of(&[[0.0; 3], [0.0, 1.0, 0.0], [0.0; 3]], 0, STEP), None);
+        assert_eq!(Cover::of(&[[0.0; 3], [0.0, 1.0, 0.0]], 0, &rules()), None);
+        assert_eq!(Cover::of(&[[0.0; 3], [0.0, 1.0, 0.0], [0.0; 3]], 0, &rules()), None);
         assert_eq!(deviation(&[[0.0; 3], [0.0, 1.0, 0.5], [0.0, 2.0, 0.0]]), 0.5);
     }
 }

@@ -6,6 +6,7 @@ mod cover;
 pub mod rank;
 pub mod shared;
 pub mod skirt;
+pub mod skirt_rules;
 pub mod slit;
 pub mod span;
 pub mod thin;

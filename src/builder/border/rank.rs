@@ -14,13 +14,7 @@ use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
-/// The squared distance of a polyline beside its vertex counts with this share of the squared length
-/// of the edges there, next to the areas of the triangles. Along a flat surface nothing else counts,
-/// but the wider a polyline swings there, the wider are its skirts.
-const LINE_WEIGHT: f64 = 0.5;
-
-/// Longer chords are measured at so many of their vertices: time stays proportional to vertices.
-const MOST_SAMPLES: usize = 64;
+use crate::builder::constants::BorderConstants;
 
 /// The summed squared distances, weighted by area, of a point from planes through one vertex; a
 /// function of its offset from the vertex.
@@ -81,8 +75,9 @@ pub struct Removal {
 
 /// All inner vertices of polylines in the order in which they go; those that never may, because a
 /// loop would fold flat without them, are left out.
-pub fn removals(lines: &[Polyline]) -> Vec<Removal> {
-    let mut chains: Vec<Thinning> = lines.iter().map(Thinning::new).collect();
+pub fn removals(lines: &[Polyline], constants: &BorderConstants) -> Vec<Removal> {
+    let mut chains: Vec<Thinning> =
+        lines.iter().map(|line| Thinning::new(line, constants)).collect();
     let mut heap = BinaryHeap::new();
     for (number, chain) in (0..).zip(&chains) {
         for index in 1..chain.line.points.len().saturating_sub(1) {
@@ -161,16 +156,18 @@ struct Thinning<'a> {
     left: usize,
     /// As few may be.
     least: usize,
+    /// See [`BorderConstants`].
+    chord_samples: usize,
 }
 
 impl<'a> Thinning<'a> {
-    fn new(line: &'a Polyline) -> Self {
+    fn new(line: &'a Polyline, constants: &BorderConstants) -> Self {
         let count = line.points.len();
         let length = |at: usize| line.points[at].distance(line.points[at + 1]);
         let weight = |at: usize| match at {
             0 => 0.0,
             _ if at + 1 == count => 0.0,
-            _ => LINE_WEIGHT * (0.5 * (length(at - 1) + length(at))).powi(2),
+            _ => constants.line_weight * (0.5 * (length(at - 1) + length(at))).powi(2),
         };
         // A loop that keeps fewer than three of its vertices would fold flat.
         let is_loop = count > 3 && line.points[0] == line.points[count - 1];
@@ -182,6 +179,7 @@ impl<'a> Thinning<'a> {
             costs: vec![0.0; count],
             left: count.saturating_sub(2),
             least: if is_loop { 2 } else { 0 },
+            chord_samples: constants.chord_samples,
         }
     }
 
@@ -204,7 +202,7 @@ impl<'a> Thinning<'a> {
             (self.line.points[from], self.line.points[to] - self.line.points[from]);
         let squared = along.length_squared();
         let inner = to - from - 1;
-        let samples = inner.min(MOST_SAMPLES);
+        let samples = inner.min(self.chord_samples);
         let (mut cost, mut farthest) = (0.0, 0f64);
         for sample in 0..samples {
             let at = from + 1 + sample * inner / samples;
@@ -251,7 +249,10 @@ mod tests {
     }
 
     fn order(lines: &[Polyline]) -> Vec<(u32, u32)> {
-        removals(lines).iter().map(|removal| (removal.line, removal.index)).collect()
+        removals(lines, &BorderConstants::default())
+            .iter()
+            .map(|removal| (removal.line, removal.index))
+            .collect()
     }
 
     #[test]
@@ -298,7 +299,7 @@ mod tests {
     #[test]
     fn the_farthest_vertex_from_the_chord_is_known_and_loops_stay_open() {
         let zigzag = [0.0, 0.25, 0.0, 0.25, 0.0];
-        let last = *removals(&[line(&zigzag, 0.0)]).last().unwrap();
+        let last = *removals(&[line(&zigzag, 0.0)], &BorderConstants::default()).last().unwrap();
         assert_eq!(last.deviation, 0.25);
         let round: Vec<DVec3> = (0..=12)
             .map(|at| {
@@ -306,7 +307,13 @@ mod tests {
             })
             .collect();
         let surfaces = vec![SurfaceQuadric::default(); round.len()];
-        assert_eq!(removals(&[Polyline { points: round, surfaces }]).len(), 11 - 2);
-        assert!(removals(&[line(&[0.0, 1.0], 0.0), line(&[], 0.0)]).is_empty());
+        assert_eq!(
+            removals(&[Polyline { points: round, surfaces }], &BorderConstants::default()).len(),
+            11 - 2
+        );
+        assert!(
+            removals(&[line(&[0.0, 1.0], 0.0), line(&[], 0.0)], &BorderConstants::default())
+                .is_empty()
+        );
     }
 }

@@ -22,10 +22,10 @@ use std::ops::Range;
 use rustc_hash::FxHashMap;
 
 use crate::builder::border::cover::{Cover, deviation};
+use crate::builder::border::skirt_rules::SkirtRules;
 use crate::builder::border::span::{BorderSpan, edges_of};
 use crate::builder::border::thin::EdgeKey;
 use crate::builder::border::vertex::{Border, Path};
-use crate::lattice::Lattice;
 use crate::mesh::{Mesh, wide};
 use crate::texture::AppendedSkirts;
 
@@ -40,62 +40,24 @@ pub struct Skirt {
     pub triangles: Vec<[u8; 3]>,
 }
 
-/// A polyline that is no farther from its edge than this many lattice steps needs no skirt: two sides
-/// that both leave theirs out are apart by rounding alone.
-const CLOSED_STEPS: f64 = 1.5;
-
-/// A polyline of lattice points along its edge is computed to be no farther from it than this.
-const COMPUTED_STEPS: f64 = 1e-6;
-
-/// What rounding to the lattice asks of skirts.
-#[derive(Clone, Copy, Debug)]
-pub struct SkirtRounding {
-    /// Skirts reach beyond what they cover by some of these, metres.
-    pub step: f64,
-    /// What is open by no more than this needs no skirt, metres.
-    pub closed: f64,
-}
-
-impl SkirtRounding {
-    /// Of a block's lattice; `quantized` where corners are rounded to it and it shows.
-    pub fn of(lattice: &Lattice, quantized: bool) -> Self {
-        match quantized {
-            // What is open by a step of a coarse lattice is seen, and its corners are rounded to
-            // the nearest, which takes half the margin.
-            true => Self { step: 0.5 * lattice.step, closed: COMPUTED_STEPS * lattice.step },
-            false => Self { step: lattice.step, closed: CLOSED_STEPS * lattice.step },
-        }
-    }
-}
-
-/// One skirt may stand for this many spans.
-const MOST_SPANS: usize = 16;
-
-/// What stands for several spans may be this many times as high as polylines are far from their edges
-/// on average. Measured: with 2, skirts take half as many triangles more.
-const SHARED_HEIGHT: f64 = 8.0;
-
-/// Nor higher than so many times as the farthest is from its edge, which leaves room for as much on
-/// both sides: no skirt is much farther from the source than the node's border is.
-const SHARED_HEIGHT_MOST: f64 = 2.5;
-
 /// The skirts that a node needs whose border on `path` is made of `spans`.
 pub fn skirts(
     mesh: &Mesh,
     border: &Border,
     spans: &[BorderSpan],
     path: &Path,
-    SkirtRounding { step, closed }: SkirtRounding,
+    rules: &SkirtRules,
 ) -> Vec<Skirt> {
+    let SkirtRules { closed, constants, .. } = rules;
     let far: Vec<f64> = spans.iter().map(|span| deviation(span.points(path))).collect();
-    let open: Vec<bool> = far.iter().map(|&far| far > closed).collect();
+    let open: Vec<bool> = far.iter().map(|&far| far > *closed).collect();
     let of_open = || far.iter().zip(&open).filter(|(_, open)| **open).map(|(far, _)| *far);
     let count = of_open().count();
     if count == 0 {
         return Vec::new();
     }
     let (mean, most) = (of_open().sum::<f64>() / count as f64, of_open().fold(0.0, f64::max));
-    let height = (SHARED_HEIGHT * mean).min(SHARED_HEIGHT_MOST * most);
+    let height = (constants.shared_height * mean).min(constants.shared_height_most * most);
     let edges = edges_of(spans, path, mesh, border);
     let in_plane = |span: &BorderSpan| {
         let (plane, points) = (path.plane(span.plane()), span.points(path));
@@ -110,12 +72,12 @@ pub fn skirts(
         let mut end = first + 1;
         if in_plane(&spans[first]) {
             end += (end..).take_while(goes_on).count();
-            for (part, cover) in parts(&spans[first..end], &open[first..end], path, height, step) {
+            for (part, cover) in parts(&spans[first..end], &open[first..end], path, height, rules) {
                 let edge = model_edge(&spans[first..end][part], path, &edges, mesh);
                 skirts.extend(edge.map(|(edge, _)| Skirt::over(edge, &cover)));
             }
         } else if open[first] {
-            skirts.extend(beside_plane(&spans[first], path, &edges, mesh, step));
+            skirts.extend(beside_plane(&spans[first], path, &edges, mesh, rules));
         }
         first = end;
     }
@@ -128,15 +90,15 @@ fn beside_plane(
     path: &Path,
     edges: &FxHashMap<EdgeKey, [u32; 2]>,
     mesh: &Mesh,
-    step: f64,
+    rules: &SkirtRules,
 ) -> Option<Skirt> {
     let plane = path.plane(span.plane());
     let points = span.points(path);
     let region = Region { points, axis: plane.axis, coordinate: plane.coordinate };
     let (edge, is_own) = model_edge(std::slice::from_ref(span), path, edges, mesh)?;
     Some(match is_own {
-        true => Skirt::new(edge, region, mesh.positions[edge[0] as usize], step),
-        false => Skirt::alone(edge, region, step),
+        true => Skirt::new(edge, region, mesh.positions[edge[0] as usize], rules),
+        false => Skirt::alone(edge, region, rules),
     })
 }
 
@@ -160,7 +122,7 @@ fn parts(
     open: &[bool],
     path: &Path,
     height: f64,
-    step: f64,
+    rules: &SkirtRules,
 ) -> Vec<(Range<usize>, Cover)> {
     let axis = path.plane(spans[0].plane()).axis;
     let mut best = vec![Division::default()];
@@ -172,10 +134,10 @@ fn parts(
             cover,
         };
         let covered =
-            |start: usize| Cover::of(spans[start].points_to(&spans[end - 1], path), axis, step);
+            |start: usize| Cover::of(spans[start].points_to(&spans[end - 1], path), axis, rules);
         let alone = end - 1;
         let mut least = extended(alone, open[alone].then(|| covered(alone)).flatten());
-        for start in (end.saturating_sub(MOST_SPANS)..alone).rev() {
+        for start in (end.saturating_sub(rules.constants.spans)..alone).rev() {
             let Some(cover) = covered(start).filter(|cover| cover.height <= height) else {
                 continue;
             };
@@ -237,12 +199,12 @@ struct Region<'a> {
 }
 
 impl Skirt {
-    fn new(edge: [u32; 2], mut region: Region, start: [f32; 3], step: f64) -> Self {
+    fn new(edge: [u32; 2], mut region: Region, start: [f32; 3], rules: &SkirtRules) -> Self {
         let mut skirt = Self { edge, corners: Vec::new(), triangles: Vec::new() };
         // The vertices of the edge that the region's ends are.
         let ends = if region.points[0] == start { [0, 1] } else { [1, 0] };
         skirt.close_ends(&mut region, ends);
-        if let Some(cover) = Cover::of(region.points, region.axis, step) {
+        if let Some(cover) = Cover::of(region.points, region.axis, rules) {
             skirt.add(&cover, ends);
         }
         skirt
@@ -256,9 +218,9 @@ impl Skirt {
     }
 
     /// A skirt whose ends are no vertices of the mesh, which looks like some edge of it.
-    fn alone(edge: [u32; 2], region: Region, step: f64) -> Self {
+    fn alone(edge: [u32; 2], region: Region, rules: &SkirtRules) -> Self {
         let (first, last) = (region.points[0], region.points[region.points.len() - 1]);
-        let mut skirt = Self::new(edge, region, first, step);
+        let mut skirt = Self::new(edge, region, first, rules);
         if skirt.triangles.as_flattened().iter().any(|&corner| corner < 2) {
             let ends = [skirt.corner(first, 0), skirt.corner(last, 1)];
             for corner in skirt.triangles.as_flattened_mut().iter_mut().filter(|at| **at < 2) {
@@ -358,11 +320,17 @@ mod tests {
     use super::*;
     use crate::builder::border::chain::{Chain, CutPlane};
     use crate::builder::border::span::{join_spans, original_spans};
+    use crate::builder::constants::BorderConstants;
+    use crate::lattice::Lattice;
 
     /// The skirt of the edge from the first to the last of some points, for the plane x = 0.
+    fn rules() -> SkirtRules {
+        SkirtRules { step: 1e-6, closed: 1e-6, constants: BorderConstants::default() }
+    }
+
     fn over(points: &[[f32; 3]]) -> Skirt {
         let span = Region { points, axis: 0, coordinate: 0.0 };
-        Skirt::new([7, 8], span, points[0], 1e-6)
+        Skirt::new([7, 8], span, points[0], &rules())
     }
 
     #[test]
@@ -404,8 +372,8 @@ mod tests {
         let spans = join_spans(spans, &path, 3, &mesh, &border);
         assert_eq!(spans.len(), (count - 1) / each);
         let lattice = Lattice { step: 1e-5 };
-        let rounding = SkirtRounding::of(&lattice, quantized);
-        (positions, skirts(&mesh, &border, &spans, &path, rounding))
+        let rules = SkirtRules::of(&lattice, quantized, BorderConstants::default());
+        (positions, skirts(&mesh, &border, &spans, &path, &rules))
     }
 
     #[test]
@@ -458,7 +426,7 @@ mod tests {
     fn a_skirt_without_an_edge_has_all_its_corners() {
         let points = [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 2.0, 1.0], [0.0, 3.0, 0.0]];
         let span = || Region { points: &points, axis: 0, coordinate: 0.0 };
-        let (hung, alone) = (over(&points), Skirt::alone([3, 4], span(), 1e-6));
+        let (hung, alone) = (over(&points), Skirt::alone([3, 4], span(), &rules()));
         assert_eq!(alone.edge, [3, 4]);
         let places = |skirt: &Skirt| -> Vec<[[f32; 3]; 3]> {
             let place = |corner: u8| match corner {

@@ -6,28 +6,8 @@
 //! compared by what they cross, by how evenly they divide triangles and space, and by how compact
 //! the halves are.
 
+use crate::builder::constants::CutConstants;
 use crate::mesh::{Coordinate, Mesh};
-
-/// Places that are compared across each side.
-const PLACES: usize = 64;
-
-/// Sides shorter than this share of the longest are not cut: the halves would be thin sheets.
-const SHORTEST: f64 = 0.25;
-
-/// The smaller of the halves has at least this share of the triangles that it should have.
-const LEAST_SHARE: f64 = 0.5;
-
-/// Weight of the squared relative deviation of the triangles' share from the one that was asked
-/// for.
-const UNEVEN_TRIANGLES: f64 = 8.0;
-
-/// The same of the space's.
-const UNEVEN_SPACE: f64 = 0.25;
-
-/// Vertices are a row where a plane through them crosses no more than one in so many of the triangles
-/// that it crosses beside them. Planes through rows that are not quite straight would leave many
-/// vertices beside them, which every level keeps.
-const ROW: usize = 4;
 
 /// A box and what to make of it.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +31,11 @@ pub struct Region {
 /// costs more by the power 3/4 of that, since the border is longer. Near the best of the places that
 /// are compared, the plane goes where it crosses the fewest: through the vertices of a row, if there
 /// are rows.
-pub fn best_plane<C: Coordinate>(mesh: &Mesh<C>, region: &Region) -> Option<(usize, f64)> {
+pub fn best_plane<C: Coordinate>(
+    mesh: &Mesh<C>,
+    region: &Region,
+    constants: &CutConstants,
+) -> Option<(usize, f64)> {
     let Region { low, high, share, .. } = *region;
     let side = |axis: usize| high[axis] - low[axis];
     let longest = (1..3).fold(0, |best, axis| if side(axis) > side(best) { axis } else { best });
@@ -61,34 +45,40 @@ pub fn best_plane<C: Coordinate>(mesh: &Mesh<C>, region: &Region) -> Option<(usi
     let mut best: Option<(f64, usize, f64)> = None;
     for axis in [longest, (longest + 1) % 3, (longest + 2) % 3] {
         let ratio = side(axis) / side(longest);
-        if ratio.is_nan() || ratio < SHORTEST {
+        if ratio.is_nan() || ratio < constants.shortest_side {
             continue;
         }
         // Square roots are alike on all machines, powers are not.
         let quarter = ratio.sqrt().sqrt();
         let longer = 1.0 / (quarter * quarter * quarter);
-        for (cost, at) in places(mesh, axis, region) {
+        for (cost, at) in places(mesh, axis, region, constants) {
             if best.is_none_or(|(least, ..)| cost * longer < least) {
                 best = Some((cost * longer, axis, at));
             }
         }
     }
     let (axis, at) = match best {
-        Some((_, axis, at)) => (axis, least_crossed(mesh, axis, at, region)),
+        Some((_, axis, at)) => (axis, least_crossed(mesh, axis, at, region, constants)),
         None => (longest, quantile(mesh, longest, share)),
     };
     (at > low[axis] && at < high[axis]).then_some((axis, at))
 }
 
 /// The places across a side at which both halves have enough triangles, with what they cost.
-fn places<C: Coordinate>(mesh: &Mesh<C>, axis: usize, region: &Region) -> Vec<(f64, f64)> {
+fn places<C: Coordinate>(
+    mesh: &Mesh<C>,
+    axis: usize,
+    region: &Region,
+    constants: &CutConstants,
+) -> Vec<(f64, f64)> {
+    let count = constants.places;
     let (low, side) = (region.low[axis], region.high[axis] - region.low[axis]);
     let total = mesh.triangles.len() as f64;
     // Of the slabs between places, how many triangles begin, end and are centred in each.
-    let mut counts = [[0u32; 3]; PLACES];
+    let mut counts = vec![[0u32; 3]; count];
     let slab = |coordinate: f64| {
-        let at = (coordinate - low) / side * PLACES as f64;
-        (at.max(0.0) as usize).min(PLACES - 1)
+        let at = (coordinate - low) / side * count as f64;
+        (at.max(0.0) as usize).min(count - 1)
     };
     for triangle in &mesh.triangles {
         let along = triangle.map(|vertex| mesh.positions[vertex as usize][axis].wide());
@@ -101,15 +91,17 @@ fn places<C: Coordinate>(mesh: &Mesh<C>, axis: usize, region: &Region) -> Vec<(f
     let share = region.share;
     let smaller = share.min(1.0 - share);
     let (mut begun, mut ended, mut below) = (0u32, 0u32, 0u32);
-    let mut places = Vec::with_capacity(PLACES);
-    for (place, [begin, end, centred]) in (1..PLACES).zip(counts) {
+    let mut places = Vec::with_capacity(count);
+    for (place, [begin, end, centred]) in (1..count).zip(counts) {
         begun += begin;
         ended += end;
         below += centred;
-        let of_space = place as f64 / PLACES as f64;
+        let of_space = place as f64 / count as f64;
         let off = [f64::from(below) / total, of_space].map(|of| (of - share) / smaller);
-        if off[0].abs() <= LEAST_SHARE {
-            let uneven = 1.0 + UNEVEN_TRIANGLES * off[0] * off[0] + UNEVEN_SPACE * off[1] * off[1];
+        if off[0].abs() <= constants.least_share {
+            let [triangles, space] = off.map(|off| off * off);
+            let uneven =
+                1.0 + constants.uneven_triangles * triangles + constants.uneven_space * space;
             let crossing = f64::from(begun - ended);
             places.push(((crossing + total.sqrt()) * uneven, low + side * of_space));
         }
@@ -119,8 +111,14 @@ fn places<C: Coordinate>(mesh: &Mesh<C>, axis: usize, region: &Region) -> Vec<(f
 
 /// Of the coordinates at which triangles begin or end, within a slab of a place, the one at which a
 /// plane crosses the fewest triangles, if that is a row; of several the nearest, and else the place.
-fn least_crossed<C: Coordinate>(mesh: &Mesh<C>, axis: usize, place: f64, region: &Region) -> f64 {
-    let slab = (region.high[axis] - region.low[axis]) / PLACES as f64;
+fn least_crossed<C: Coordinate>(
+    mesh: &Mesh<C>,
+    axis: usize,
+    place: f64,
+    region: &Region,
+    constants: &CutConstants,
+) -> f64 {
+    let slab = (region.high[axis] - region.low[axis]) / constants.places as f64;
     let (from, to) = (place - slab, place + slab);
     // Planes over the first of these coordinates and below the second cross a triangle.
     let (mut starts, mut ends, mut candidates) = (Vec::new(), Vec::new(), vec![place]);
@@ -154,7 +152,7 @@ fn least_crossed<C: Coordinate>(mesh: &Mesh<C>, axis: usize, place: f64, region:
         let off = |at: f64| (at - place).abs();
         a.0.cmp(&b.0).then_with(|| off(a.1).total_cmp(&off(b.1)))
     });
-    let row = least.filter(|&(crossed, _)| crossed <= at_place / ROW);
+    let row = least.filter(|&(crossed, _)| crossed <= at_place / constants.row);
     row.map_or(place, |(_, at)| at)
 }
 
@@ -200,9 +198,10 @@ mod tests {
     #[test]
     fn an_even_mesh_is_cut_across_its_longest_side_at_the_share() {
         let mesh = yard(30);
-        let (axis, at) = best_plane(&mesh, &region(&mesh, 0.5)).unwrap();
+        let (axis, at) = best_plane(&mesh, &region(&mesh, 0.5), &CutConstants::default()).unwrap();
         assert!(axis == 1 && (at - 15.0).abs() < 2.5, "{axis} {at}");
-        let (axis, at) = best_plane(&mesh, &region(&mesh, 1.0 / 3.0)).unwrap();
+        let (axis, at) =
+            best_plane(&mesh, &region(&mesh, 1.0 / 3.0), &CutConstants::default()).unwrap();
         assert!(axis == 1 && (at - 10.0).abs() < 2.5, "{axis} {at}");
     }
 
@@ -211,7 +210,7 @@ mod tests {
         let mut mesh = yard(30);
         // All but the last rows within a tenth of the length.
         mesh.positions.iter_mut().for_each(|p| p[1] = if p[1] < 27.0 { p[1] * 0.1 } else { p[1] });
-        let (axis, at) = best_plane(&mesh, &region(&mesh, 0.5)).unwrap();
+        let (axis, at) = best_plane(&mesh, &region(&mesh, 0.5), &CutConstants::default()).unwrap();
         let below = mesh.positions.iter().filter(|p| f64::from(p[axis]) < at).count();
         let share = below as f64 / mesh.positions.len() as f64;
         assert!((0.2..=0.8).contains(&share), "{share} below {at} on {axis}");
@@ -220,7 +219,7 @@ mod tests {
     #[test]
     fn a_plane_near_a_row_goes_through_it_and_a_step_makes_no_difference() {
         let rows = yard(37);
-        let (axis, at) = best_plane(&rows, &region(&rows, 0.5)).unwrap();
+        let (axis, at) = best_plane(&rows, &region(&rows, 0.5), &CutConstants::default()).unwrap();
         assert!(axis == 1 && (at == 18.0 || at == 19.0), "{axis} {at}");
         let mut shifted = rows.clone();
         // A row that is not quite straight.
@@ -228,7 +227,7 @@ mod tests {
             p[1] += [0.0, 1e-3, -1e-3][number % 3];
         }
         let touching = Region { touching: 4e-3, ..region(&shifted, 0.5) };
-        let (axis, at) = best_plane(&shifted, &touching).unwrap();
+        let (axis, at) = best_plane(&shifted, &touching, &CutConstants::default()).unwrap();
         assert!(axis == 1 && (at - at.round()).abs() < 2e-3, "{at}");
     }
 
@@ -236,11 +235,14 @@ mod tests {
     fn a_gap_is_found_and_points_are_not_cut() {
         let mut mesh = yard(30);
         mesh.triangles.retain(|t| !(187..209).contains(&t[0]));
-        let (axis, at) = best_plane(&mesh, &region(&mesh, 0.5)).unwrap();
+        let (axis, at) = best_plane(&mesh, &region(&mesh, 0.5), &CutConstants::default()).unwrap();
         assert!(axis == 1 && at > 17.0 && at < 19.0, "{axis} {at}");
         let mut point = yard(2);
         point.positions.iter_mut().for_each(|p| *p = [1.0; 3]);
-        assert_eq!(best_plane(&point, &region(&point, 0.5)), None);
-        assert_eq!(best_plane(&Mesh::<f32>::default(), &region(&mesh, 0.5)), None);
+        assert_eq!(best_plane(&point, &region(&point, 0.5), &CutConstants::default()), None);
+        assert_eq!(
+            best_plane(&Mesh::<f32>::default(), &region(&mesh, 0.5), &CutConstants::default()),
+            None
+        );
     }
 }

@@ -7,6 +7,7 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::builder::constants::CutConstants;
 use crate::mesh::{Coordinate, DisjointSet, Mesh, PositionKey, key};
 
 /// Bodies up to this size stay whole.
@@ -17,9 +18,6 @@ pub struct UncutComponents {
     /// The most triangles that they have.
     pub triangles: usize,
 }
-
-/// Bodies that extend over no more than this share of a slab are not cut.
-const OF_SLAB: f64 = 0.5;
 
 /// What is known of a body.
 #[derive(Clone, Copy)]
@@ -33,8 +31,8 @@ struct Body {
 
 impl UncutComponents {
     /// Those small beside slabs of `width` metres, with so many triangles at most.
-    pub fn in_slabs(width: f64, triangles: usize) -> Self {
-        Self { extent: width * OF_SLAB, triangles }
+    pub fn in_slabs(width: f64, triangles: usize, constants: &CutConstants) -> Self {
+        Self { extent: width * constants.uncut, triangles }
     }
 
     /// The vertices of bodies that the plane through `coordinate` would cut and that stay whole,

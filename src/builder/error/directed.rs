@@ -21,31 +21,13 @@ use super::original::{Original, Search, TriangleId};
 use super::overlay::{Mark, Marks, Overlay};
 use super::polygon::{Clipped, Polygon, bisect, centroid, clip};
 use super::triangle::{LANES, Points, Triangle, max};
+use crate::builder::constants::MeasureConstants;
 
 /// The bound is at most so many times the largest distance found, as far as the budget goes.
 pub const TIGHTNESS: f32 = 1.1;
 
-/// Polygons that one triangle is divided into at once. What is then left waits until that of all
-/// other triangles is known, and is taken up with the largest bound first.
-const POLYGONS_PER_TRIANGLE: usize = 256;
-
-/// Polygons that wait are divided so many times in all, or so many times for each triangle of
-/// both surfaces.
-const BUDGET: usize = 4096;
-const BUDGET_PER_TRIANGLE: usize = 4;
-
 /// A polygon with more corners is bisected: clipping may add some.
 const MOST_CORNERS: usize = 24;
-
-/// A polygon this many times as large as the region that it would be clipped to is bisected.
-const MUCH_LARGER: f64 = 16.0;
-
-/// A triangle not farther from a polygon's centre than this share of the largest distance will do
-/// as the nearest.
-const NEAR_ENOUGH: f32 = 0.5;
-
-/// Leaves whose first triangles are measured before all others.
-const SEEDS: usize = 64;
 
 /// The largest distance of both ways, as far as it is known.
 #[derive(Clone, Copy, Debug)]
@@ -111,6 +93,7 @@ pub(super) struct Directed<'a> {
     overlay: Overlay<'a>,
     largest: Largest,
     budget: usize,
+    constants: MeasureConstants,
 }
 
 /// A triangle that is not settled.
@@ -128,7 +111,7 @@ pub(super) fn seed(from: &Original, to: &Original, largest: &mut Largest) {
     let leaves: usize = from.parts.iter().map(|part| part.bvh.leaves.len()).sum();
     let leaves_of = |part: usize| from.parts[part].bvh.leaves.iter();
     let all = (0..from.parts.len()).flat_map(leaves_of);
-    for leaf in all.step_by(leaves.div_ceil(SEEDS)) {
+    for leaf in all.step_by(leaves.div_ceil(from.constants.seeds)) {
         for point in leaf.lane(0).corners() {
             let near = search.nearest(point, largest.found);
             largest.found = largest.found.max(near.squared.sqrt());
@@ -139,9 +122,10 @@ pub(super) fn seed(from: &Original, to: &Original, largest: &mut Largest) {
 impl<'a> Directed<'a> {
     pub fn new(from: &'a Original, to: &'a Original, largest: Largest, rounding: f32) -> Self {
         let triangles = from.triangle_count() + to.triangle_count();
-        let budget = BUDGET.max(BUDGET_PER_TRIANGLE * triangles);
+        let constants = from.constants;
+        let budget = constants.divisions.max(constants.divisions_per_triangle * triangles);
         let (search, overlay) = (Search::new(to), Overlay::new(to));
-        Self { from, marks: None, rounding, search, overlay, largest, budget }
+        Self { from, marks: None, rounding, search, overlay, largest, budget, constants }
     }
 
     /// With what the way back has told. The surface it goes to must be of one mesh.
@@ -178,7 +162,7 @@ impl<'a> Directed<'a> {
     /// it or what makes a triangle worth clipping to.
     fn measure_near(&mut self, centre: Vec3, reach: f32) -> (f32, TriangleId) {
         let settling = self.largest.limit() - reach;
-        self.measure(centre, settling.max(self.largest.found * NEAR_ENOUGH))
+        self.measure(centre, settling.max(self.largest.found * self.constants.near_enough))
     }
 
     fn child(&mut self, part: u32, child: u32, bounds: Box3, open: &mut Vec<Open>) {
@@ -292,7 +276,7 @@ impl<'a> Directed<'a> {
             if self.largest.settles(part.bound) {
                 continue;
             }
-            if divisions == POLYGONS_PER_TRIANGLE {
+            if divisions == self.constants.polygons_per_triangle {
                 left.push(Waiting { number: left.len(), part });
                 continue;
             }
@@ -343,7 +327,8 @@ impl<'a> Directed<'a> {
             return;
         }
         let limit = self.largest.limit();
-        let much_larger = reach > MUCH_LARGER * f64::from(triangle.length + 2.0 * limit);
+        let much_larger =
+            reach > self.constants.much_larger * f64::from(triangle.length + 2.0 * limit);
         if corners.len() <= MOST_CORNERS && !much_larger {
             // What is clipped exactly to the limit would seem to be beyond it half of the time.
             let near = f64::from(limit - self.rounding);

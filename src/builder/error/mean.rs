@@ -3,19 +3,21 @@
 use glam::Vec3;
 
 use super::original::{Original, Search};
+use crate::builder::constants::MeasureConstants;
 use crate::mesh::Mesh;
 
 /// A mesh that others are compared with.
 pub struct MeanDistance<'a> {
     mesh: &'a Mesh,
+    constants: MeasureConstants,
     /// What others are measured to, and from where; made when first needed.
     surface: Option<(Original, Vec<Vec3>)>,
 }
 
 impl<'a> MeanDistance<'a> {
     /// Of distances from this mesh.
-    pub fn from(mesh: &'a Mesh) -> Self {
-        Self { mesh, surface: None }
+    pub fn from(mesh: &'a Mesh, constants: MeasureConstants) -> Self {
+        Self { mesh, constants, surface: None }
     }
 
     /// The mean distance from each of the two meshes to the other, added up, metres; infinite
@@ -23,8 +25,9 @@ impl<'a> MeanDistance<'a> {
     /// from one that is bent all over. Once it is clear that it exceeds `limit`, some number above
     /// that.
     pub fn to(&mut self, other: &Mesh, limit: f64) -> f64 {
+        let constants = self.constants;
         let surface = |mesh: &Mesh| {
-            let surface = Original::of_points(mesh);
+            let surface = Original::of_points(mesh, constants);
             let points = surface.samples();
             (surface, points)
         };
@@ -64,7 +67,7 @@ mod tests {
         let square = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0], [0.0, 4.0, 0.0]];
         let flat = mesh(&square, &[[0, 1, 2], [0, 2, 3]]);
         let lifted = mesh(&square.map(|[x, y, _]| [x, y, 0.5]), &[[0, 1, 2], [0, 2, 3]]);
-        let mut from = MeanDistance::from(&flat);
+        let mut from = MeanDistance::from(&flat, MeasureConstants::default());
         assert!(from.to(&flat, f64::INFINITY) < 1e-6);
         let apart = from.to(&lifted, f64::INFINITY);
         assert!((apart - 1.0).abs() < 1e-6, "{apart}");

@@ -62,7 +62,7 @@ pub fn surface_error(original: &Original, simplified: &Mesh) -> SurfaceError {
 
 /// [`surface_error`], and how it was found.
 pub fn measure(original: &Original, simplified: &Mesh) -> Measured {
-    let simplified = &Original::of(simplified);
+    let simplified = &Original::of(simplified, original.constants);
     let all = |distance: f64| {
         let error = SurfaceError { bound: distance, mean: distance, rms: distance, p95: distance };
         Measured { error, largest: distance, ..Default::default() }

@@ -8,6 +8,7 @@ use super::adjacency::{Adjacency, Links, Slot};
 use super::bvh::{Box3, Bvh, LEAF, Node, Tree};
 use super::samples::Samples;
 use super::triangle::{LANES, Triangle, min};
+use crate::builder::constants::MeasureConstants;
 use crate::mesh::Mesh;
 
 /// The original surface of a chunk, searchable; built once and shared by all levels above it.
@@ -24,6 +25,8 @@ pub struct Original {
     pub(super) bounds: Box3,
     /// The longest edge.
     pub(super) longest: f32,
+    /// How it is measured.
+    pub(super) constants: MeasureConstants,
 }
 
 /// One mesh.
@@ -54,32 +57,35 @@ impl TriangleId {
 
 impl Original {
     /// The surface of one mesh.
-    pub fn of(mesh: &Mesh) -> Self {
+    pub fn of(mesh: &Mesh, constants: MeasureConstants) -> Self {
         if mesh.triangles.is_empty() {
-            return Self::from_parts(Vec::new());
+            return Self::from_parts(Vec::new(), constants);
         }
         let (bvh, leaves) = Bvh::new(mesh);
         let adjacency = Adjacency::new(mesh, &leaves);
-        let samples = Samples::of(&bvh);
-        Self::from_parts(vec![Arc::new(Part { bvh, samples, adjacency })])
+        let samples = Samples::of(&bvh, &constants);
+        Self::from_parts(vec![Arc::new(Part { bvh, samples, adjacency })], constants)
     }
 
     /// The surface of one mesh, of which nothing is asked but what is near points.
-    pub(super) fn of_points(mesh: &Mesh) -> Self {
+    pub(super) fn of_points(mesh: &Mesh, constants: MeasureConstants) -> Self {
         if mesh.triangles.is_empty() {
-            return Self::from_parts(Vec::new());
+            return Self::from_parts(Vec::new(), constants);
         }
         let (bvh, _) = Bvh::new(mesh);
-        let samples = Samples::of(&bvh);
-        Self::from_parts(vec![Arc::new(Part { bvh, samples, adjacency: Adjacency::default() })])
+        let samples = Samples::of(&bvh, &constants);
+        let adjacency = Adjacency::default();
+        Self::from_parts(vec![Arc::new(Part { bvh, samples, adjacency })], constants)
     }
 
     /// Several surfaces as one. Their triangles are shared, not copied.
     pub fn union(parts: Vec<Arc<Self>>) -> Self {
-        Self::from_parts(parts.iter().flat_map(|part| part.parts.iter().cloned()).collect())
+        let constants = parts.first().map_or_else(Default::default, |part| part.constants);
+        let all = parts.iter().flat_map(|part| part.parts.iter().cloned());
+        Self::from_parts(all.collect(), constants)
     }
 
-    fn from_parts(parts: Vec<Arc<Part>>) -> Self {
+    fn from_parts(parts: Vec<Arc<Part>>, constants: MeasureConstants) -> Self {
         let boxes: Vec<Box3> = parts.iter().map(|part| part.bvh.bounds).collect();
         let (top, leaves) = Tree::new(&boxes, 1);
         Self {
@@ -89,6 +95,7 @@ impl Original {
             longest: parts.iter().map(|part| part.bvh.longest).fold(0.0, f32::max),
             links: Arc::new(Links::between(parts.iter().map(|part| &part.adjacency))),
             parts,
+            constants,
         }
     }
 

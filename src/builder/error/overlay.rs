@@ -15,17 +15,7 @@ use glam::{Vec2, Vec3, Vec3A, Vec3Swizzles};
 use super::adjacency::{Linked, Slot};
 use super::original::{Original, TriangleId};
 use super::triangle::{Triangle, max, min};
-
-/// The triangle is made smaller by moving its corners inward by this share of the distance that is
-/// to be proven: its edges often lie at a border or a fold of the other surface, a little beyond
-/// it or within. What then remains is for the height.
-const ASIDE: f32 = 0.3;
-
-/// No triangle is made smaller by more than this.
-const MOST_SMALLER: f32 = 0.9;
-
-/// More triangles are not visited.
-const MOST_VISITED: usize = 512;
+use crate::builder::constants::MeasureConstants;
 
 /// By so many times the rounding of coordinates edges are taken to be longer and points to be
 /// nearer to edges.
@@ -124,8 +114,9 @@ impl<'a> Overlay<'a> {
         rounding: f32,
     ) -> Option<f32> {
         let margin = ROUNDINGS * rounding;
-        let base = Base::new(triangle, limit * ASIDE, margin)?;
-        let most = (limit * limit * (1.0 - ASIDE * ASIDE)).sqrt() - margin;
+        let MeasureConstants { aside, most_smaller, most_visited, .. } = self.original.constants;
+        let base = Base::new(triangle, limit * aside, most_smaller, margin)?;
+        let most = (limit * limit * (1.0 - aside * aside)).sqrt() - margin;
         if most <= 0.0 {
             return None;
         }
@@ -146,7 +137,7 @@ impl<'a> Overlay<'a> {
                     *mark = Mark::SETTLED;
                     // Also where the walk fails, and its bound counts for nothing.
                     let height = seen.height.abs().max_element() + margin;
-                    let farthest = min(limit, height.hypot(limit * ASIDE));
+                    let farthest = min(limit, height.hypot(limit * aside));
                     self.marks.farthest = max(self.marks.farthest, farthest);
                 } else if *mark == Mark::NONE || seen.is_centred() {
                     *mark = Mark::near(slot);
@@ -165,11 +156,11 @@ impl<'a> Overlay<'a> {
                     }
                 }
             }
-            if self.queue.len() > MOST_VISITED {
+            if self.queue.len() > most_visited {
                 return None;
             }
         }
-        is_covered.then(|| min(limit, (highest + margin).hypot(limit * ASIDE)))
+        is_covered.then(|| min(limit, (highest + margin).hypot(limit * aside)))
     }
 
     #[inline(always)]
@@ -200,13 +191,13 @@ struct Base {
 impl Base {
     /// `None` for a triangle without area.
     #[inline(always)]
-    fn new(triangle: &Triangle, aside: f32, margin: f32) -> Option<Self> {
+    fn new(triangle: &Triangle, aside: f32, most_smaller: f32, margin: f32) -> Option<Self> {
         let &Triangle { origin, along, up, length, apex } = triangle;
         let corners = [Vec2::ZERO, Vec2::new(length, 0.0), Vec2::from(apex)];
         let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
         let radius = corners.iter().map(|corner| corner.distance_squared(centre));
         let radius = radius.fold(0.0, max).sqrt();
-        let smaller = min(aside / radius, MOST_SMALLER);
+        let smaller = min(aside / radius, most_smaller);
         let corners = corners.map(|corner| corner + (centre - corner) * smaller);
         let mut edges = [(Vec2::ZERO, 0.0); 3];
         let mut reach = [0.0; 3];

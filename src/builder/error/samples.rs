@@ -4,14 +4,11 @@ use glam::Vec3;
 
 use super::bvh::Bvh;
 use super::original::Original;
+use crate::builder::constants::MeasureConstants;
 
-/// Points of a surface: so many for each triangle, within limits. Fewer leave means of small
-/// surfaces to chance; more of large ones only cost time.
-const POINTS_PER_TRIANGLE: usize = 2;
-const POINTS: std::ops::RangeInclusive<usize> = 256..=512;
-
-fn points_of(triangles: usize) -> usize {
-    (triangles * POINTS_PER_TRIANGLE).clamp(*POINTS.start(), *POINTS.end())
+fn points_of(triangles: usize, constants: &MeasureConstants) -> usize {
+    let &MeasureConstants { points_per_triangle, least_points, most_points, .. } = constants;
+    (triangles * points_per_triangle).clamp(least_points, most_points)
 }
 
 /// Points of one mesh, each for as much area as any other, in the order of the leaves of its
@@ -23,13 +20,13 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    pub fn of(bvh: &Bvh) -> Self {
+    pub fn of(bvh: &Bvh, constants: &MeasureConstants) -> Self {
         let lanes = || {
             let leaves = bvh.leaves.iter().zip(&bvh.counts);
             leaves.flat_map(|(leaf, &count)| (0..usize::from(count)).map(|lane| leaf.lane(lane)))
         };
         let area: f64 = lanes().map(|triangle| triangle.area()).sum();
-        let count = points_of(lanes().count());
+        let count = points_of(lanes().count(), constants);
         let step = area / count as f64;
         let mut points = Vec::with_capacity(count + 1);
         if !(step > 0.0 && step.is_finite()) {
@@ -52,7 +49,7 @@ impl Original {
     /// Points from each part, as many as its area asks for; none where there is no area.
     pub(super) fn samples(&self) -> Vec<Vec3> {
         let area: f64 = self.parts.iter().map(|part| part.samples.area).sum();
-        let count = points_of(self.triangle_count());
+        let count = points_of(self.triangle_count(), &self.constants);
         let step = area / count as f64;
         if !(step > 0.0 && step.is_finite()) {
             return Vec::new();
@@ -86,7 +83,7 @@ fn spread(number: usize) -> [f32; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::mesh;
+    use super::super::tests::{mesh, surface_of};
     use super::*;
 
     #[test]
@@ -95,8 +92,8 @@ mod tests {
             &[[0.0; 3], [6.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 2.0, 0.0]],
             &[[0, 1, 2], [2, 3, 4], [0, 1, 0]],
         );
-        let points = Original::of(&mesh).samples();
-        let count = points_of(3);
+        let points = surface_of(&mesh).samples();
+        let count = points_of(3, &MeasureConstants::default());
         assert!(points.len().abs_diff(count) <= 1);
         let of_first = points.iter().filter(|p| p.x / 6.0 + p.y <= 1.0 + 1e-6).count();
         assert!(of_first.abs_diff(count * 6 / 7) <= 1, "{of_first}");

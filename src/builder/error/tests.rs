@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::builder::border::vertex::{Border, Path};
+use crate::builder::constants::{Constants, MeasureConstants};
 use crate::builder::simplify::ladder::{AppearanceWeights, Method, Simplifier, simplify};
 use crate::mesh::UpAxis;
 
@@ -19,6 +20,11 @@ impl Random {
     fn point(&mut self, size: f32) -> [f32; 3] {
         [0; 3].map(|_: i32| self.unit() * size)
     }
+}
+
+/// To be measured with the constants that builds use.
+pub(super) fn surface_of(mesh: &Mesh) -> Original {
+    Original::of(mesh, MeasureConstants::default())
 }
 
 pub(super) fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Mesh {
@@ -77,7 +83,7 @@ fn farthest(from: &Mesh, to: &Mesh, steps: u32) -> f64 {
 
 /// Checks the bound of two meshes against dense points; how many times as large it is.
 fn check(a: &Mesh, b: &Mesh, steps: u32, case: &str) -> f64 {
-    let measured = measure(&Original::of(a), b);
+    let measured = measure(&surface_of(a), b);
     let dense = farthest(a, b, steps).max(farthest(b, a, steps));
     let coordinates = [a, b].into_iter().flat_map(|mesh| mesh.positions.as_flattened());
     let far = coordinates.fold(0f32, |far, x| far.max(x.abs()));
@@ -174,7 +180,7 @@ fn equal_meshes_are_at_no_distance_and_a_lifted_one_at_its_lift() {
     let flat = mesh(&SQUARE, &[[0, 1, 2], [0, 2, 3]]);
     let turned = mesh(&SQUARE, &[[0, 1, 3], [1, 2, 3]]);
     let lifted = moved(&flat, [0.0, 0.0, 0.5]);
-    let original = Original::of(&flat);
+    let original = surface_of(&flat);
     assert_eq!(surface_error(&original, &flat).bound, 0.0);
     assert_eq!(surface_error(&original, &turned), SurfaceError::default());
     let SurfaceError { bound, mean, rms, p95 } = surface_error(&original, &lifted);
@@ -182,13 +188,13 @@ fn equal_meshes_are_at_no_distance_and_a_lifted_one_at_its_lift() {
         assert!((distance - 0.5).abs() < 1e-5, "{distance}");
     }
     let far = [8_000.0, 9_000.0, 100.0];
-    assert_eq!(surface_error(&Original::of(&moved(&flat, far)), &moved(&turned, far)).bound, 0.0);
+    assert_eq!(surface_error(&surface_of(&moved(&flat, far)), &moved(&turned, far)).bound, 0.0);
 }
 
 #[test]
 fn nothing_is_as_far_as_what_it_stands_for_is_large() {
     let flat = mesh(&SQUARE, &[[0, 1, 2], [0, 2, 3]]);
-    let (some, none) = (Original::of(&flat), Original::of(&Mesh::default()));
+    let (some, none) = (surface_of(&flat), surface_of(&Mesh::default()));
     assert!(none.is_empty() && !some.is_empty());
     let diagonal = f64::from(32f32.sqrt());
     assert_eq!(surface_error(&some, &Mesh::default()).bound, diagonal);
@@ -215,7 +221,7 @@ fn an_edge_across_a_shallow_notch_is_found() {
     // From the foot of the notch to the nearer of its two edges.
     let deepest = 0.04 * f64::cos(f64::atan(0.04 / 7.3));
     for (a, b) in [(&notched, &straight), (&straight, &notched)] {
-        let bound = surface_error(&Original::of(a), b).bound;
+        let bound = surface_error(&surface_of(a), b).bound;
         assert!(bound >= deepest && bound <= deepest * 1.2, "{bound} {deepest}");
     }
 }
@@ -251,7 +257,7 @@ fn a_small_hole_amid_long_strips_that_come_back_otherwise_is_found() {
     add(&corners, [&ring, &[[0, 1, 2]]]);
     // The radius of the circle in the hole: twice its area over its edges.
     let radius = 0.3 * 0.25 / (0.3 + 2.0 * 0.15f64.hypot(0.25));
-    let measured = measure(&Original::of(&meshes[0]), &meshes[1]);
+    let measured = measure(&surface_of(&meshes[0]), &meshes[1]);
     let bound = measured.error.bound;
     assert!(bound >= radius && bound <= radius * 1.2, "{measured:?} {radius}");
     assert!(!measured.exhausted);
@@ -275,7 +281,7 @@ fn a_union_is_as_its_parts_in_one() {
         all.materials.resize(all.positions.len(), 0);
         all.triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
     }
-    let some: Vec<Arc<Original>> = parts.iter().map(|part| Arc::new(Original::of(part))).collect();
+    let some: Vec<Arc<Original>> = parts.iter().map(|part| Arc::new(surface_of(part))).collect();
     let nested = Original::union(vec![
         Arc::new(Original::union(some[..4].to_vec())),
         Arc::new(Original::union(some[4..].to_vec())),
@@ -283,7 +289,7 @@ fn a_union_is_as_its_parts_in_one() {
     ]);
     assert_eq!(nested.triangle_count(), all.triangles.len());
     let other = moved(&sheet(&mut random, 19, 0.5), [0.1, 0.2, 0.3]);
-    let [one, of_parts] = [&Original::of(&all), &nested].map(|original| measure(original, &other));
+    let [one, of_parts] = [&surface_of(&all), &nested].map(|original| measure(original, &other));
     let tight = f64::from(TIGHTNESS) * (1.0 + 1e-5);
     assert!(one.error.bound <= of_parts.error.bound * tight, "{one:?} {of_parts:?}");
     assert!(of_parts.error.bound <= one.error.bound * tight, "{one:?} {of_parts:?}");
@@ -297,14 +303,14 @@ fn any_order_of_triangles_gives_a_valid_bound() {
     let mut random = Random(17);
     let a = sheet(&mut random, 9, 1.0);
     let b = sheet(&mut random, 6, 1.0);
-    let largest = measure(&Original::of(&a), &b).largest;
+    let largest = measure(&surface_of(&a), &b).largest;
     for _ in 0..10 {
         let mut order = a.clone();
         for i in (1..order.triangles.len()).rev() {
             order.triangles.swap(i, (random.unit() * (i + 1) as f32) as usize);
         }
         order.triangles.iter_mut().for_each(|t| t.rotate_left((random.unit() * 3.0) as usize));
-        let measured = measure(&Original::of(&order), &b);
+        let measured = measure(&surface_of(&order), &b);
         assert!(
             measured.error.bound >= largest
                 && measured.largest <= largest * f64::from(TIGHTNESS) * 1.001
@@ -329,7 +335,7 @@ fn many_triangles_in_one_place_are_no_harder() {
         all(&mut |_| [along(random.unit()), along(random.unit()), along(random.unit())]),
     ];
     for (number, case) in cases.iter().enumerate() {
-        let original = Original::of(case);
+        let original = surface_of(case);
         let itself = measure(&original, case);
         assert!(itself.error.bound < 1e-5 && !itself.exhausted, "{number}: {itself:?}");
         let measured = measure(&original, &few);
@@ -351,10 +357,10 @@ fn case_sample(mesh: &Mesh) -> Box<Mesh> {
 fn nothing_is_claimed_of_coordinates_that_are_not_finite() {
     for bad in [f32::INFINITY, f32::NAN, f32::MAX] {
         let mut flat = mesh(&SQUARE, &[[0, 1, 2], [0, 2, 3]]);
-        let good = Original::of(&flat);
+        let good = surface_of(&flat);
         flat.positions[1][0] = bad;
         assert_eq!(surface_error(&good, &flat).bound, f64::INFINITY, "{bad}");
-        assert_eq!(surface_error(&Original::of(&flat), &flat).bound, f64::INFINITY, "{bad}");
+        assert_eq!(surface_error(&surface_of(&flat), &flat).bound, f64::INFINITY, "{bad}");
     }
 }
 
@@ -372,7 +378,7 @@ fn a_plane_of_fewer_triangles_is_at_no_distance() {
         let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)];
         plane.triangles.extend([[a, b, c], [a, c, d]]);
     }
-    let original = Original::of(&plane);
+    let original = surface_of(&plane);
     for target in [900, 100, 2] {
         let method = Method {
             simplifier: Simplifier::Qem,
@@ -380,6 +386,7 @@ fn a_plane_of_fewer_triangles_is_at_no_distance() {
             up: UpAxis::Z,
             reorientable: &[true],
             without: None,
+            constants: &Constants::default(),
         };
         let border = Border::interior(plane.positions.len());
         let fewer = simplify(&plane, &border, &Path::default(), 0, target, &method).mesh;

@@ -6,7 +6,8 @@ use super::BlockBuilder;
 use super::node::{NodeDraft, NodeSink};
 use crate::Result;
 use crate::builder::border::cap::cap_sections;
-use crate::builder::border::skirt::{Skirt, SkirtRounding, skirts, triangles_of};
+use crate::builder::border::skirt::{Skirt, skirts, triangles_of};
+use crate::builder::border::skirt_rules::SkirtRules;
 use crate::builder::border::span::{BorderSpan, join_spans};
 use crate::builder::border::thin::thin_border;
 use crate::builder::border::vertex::{Border, Path};
@@ -122,13 +123,14 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         keep_folds: bool,
     ) -> Coarse {
         let &CoarseNode { path, resolution, budget, .. } = node;
-        let rounding = SkirtRounding::of(&self.lattice, self.quantization.is_some());
+        let constants = &self.options.constants;
+        let rules = SkirtRules::of(&self.lattice, self.quantization.is_some(), constants.border);
         let at = resolution as u8;
         let mut mesh = source.clone();
         thin_border(&mut mesh, &mut border, path, at);
         // Skirts count towards the budget, but may not take more than half of it.
         let spans = join_spans(spans, path, at, &mesh, &border);
-        let skirt_triangles = triangles_of(&skirts(&mesh, &border, &spans, path, rounding));
+        let skirt_triangles = triangles_of(&skirts(&mesh, &border, &spans, path, &rules));
         let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
         let weights = AppearanceWeights { keep_folds, ..self.options.weights };
         let method = Method {
@@ -137,6 +139,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             up: self.up,
             reorientable: self.reorientable,
             without: self.options.without,
+            constants,
         };
         let mut result = simplify(&mesh, &border, path, at, target, &method);
         if self.quantization.is_some() {
@@ -146,7 +149,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             result = fallback_triangles(source, &border, FALLBACK_TRIANGLES.min(target));
         }
         cap_sections(&mut result, &spans, path, &mesh, &border);
-        let mut skirts = skirts(&result.mesh, &result.border, &spans, path, rounding);
+        let mut skirts = skirts(&result.mesh, &result.border, &spans, path, &rules);
         if self.quantization.is_some() {
             for (position, _) in skirts.iter_mut().flat_map(|skirt| &mut skirt.corners) {
                 *position = self.lattice.nearest(*position);

@@ -9,12 +9,6 @@ use crate::builder::cut::split::{Chunk, Cut, cut};
 use crate::builder::cut::uncut::UncutComponents;
 use crate::mesh::Mesh;
 
-/// A node keeps at most one border vertex on a plane for this many triangles of its budget: each
-/// costs about a triangle of the mesh and two of a skirt, and a node has two planes. Measured: with
-/// half of this scans gain border and lose more on the surface; with twice, borders are coarser
-/// than the surface (`docs/choices.md`).
-const BUDGET_PER_BORDER_VERTEX: f64 = 24.0;
-
 /// The box of a chunk without what small components reach beyond the planes that it was cut at
 /// ([`crate::builder::cut::uncut`]): slabs stay as even as their planes are.
 fn bounds_within_cuts(chunk: &Chunk) -> Option<([f32; 3], [f32; 3])> {
@@ -56,12 +50,13 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         // Where children are leaves but for some that have too many triangles, these stay at the
         // node's own resolution.
         let first = (resolution + 1).min(self.resolutions.last().saturating_sub(1)).max(resolution);
+        let border = self.options.constants.border;
         let locked = self.options.borders == BorderMode::Locked;
         let share = |factor: &f64| if locked { 1.0 } else { 1.0 / factor.sqrt() };
         let shares: Vec<f64> = factors[first..].iter().map(share).collect();
         // The deeper the level, the more nodes share the plane: as many as fit along its length.
         let across = f64::from(self.options.level_factor).sqrt();
-        let each = f64::from(self.options.desired_tris) / BUDGET_PER_BORDER_VERTEX;
+        let each = f64::from(self.options.desired_tris) / border.triangles_per_vertex;
         let most = |deeper: usize| {
             if locked { f64::INFINITY } else { (each * across.powi(deeper as i32)).ceil() }
         };
@@ -71,6 +66,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             first_level: first as u8,
             collinear: if locked { -1.0 } else { self.lattice.step },
             baked: self.bake.filter(|plan| plan.always.is_some()).map(|plan| plan.classes),
+            constants: border,
         }
     }
 
@@ -91,7 +87,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             chunks.push(chunk);
             return;
         };
-        let Some((axis, at)) = best_plane(&chunk.mesh, &region) else {
+        let Some((axis, at)) = best_plane(&chunk.mesh, &region, &self.options.constants.cut) else {
             chunks.push(chunk);
             return;
         };
@@ -148,12 +144,13 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         width: f64,
         rule: &'r KeepRule,
     ) -> Cut<'r, f32> {
+        let most = self.options.desired_tris as usize / 2;
         Cut {
             axis,
             coordinate,
             lattice: Some(self.lattice),
             tolerance: self.options.tolerance,
-            whole: UncutComponents::in_slabs(width, self.options.desired_tris as usize / 2),
+            whole: UncutComponents::in_slabs(width, most, &self.options.constants.cut),
             rule,
         }
     }

@@ -174,7 +174,9 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             BorderMode::Skirts => original_spans(&mesh, &border, node.path),
             BorderMode::Locked | BorderMode::Shared => Vec::new(),
         };
-        let original = self.stages.time(Stage::Measure, || Arc::new(Original::of(&mesh)));
+        let constants = self.options.constants.measure;
+        let of_mesh = || Arc::new(Original::of(&mesh, constants));
+        let original = self.stages.time(Stage::Measure, of_mesh);
         let error = SurfaceError::default().plus(moved);
         NodeSurface { mesh, border, spans, original, moved, error, baked: false }
     }

@@ -1,5 +1,6 @@
 //! How one block is built.
 
+use crate::builder::constants::Constants;
 use crate::builder::cut::split::CutTolerance;
 use crate::builder::simplify::ladder::{AppearanceWeights, Simplifier};
 use crate::builder::simplify::simplified::LadderStep;
@@ -73,6 +74,8 @@ pub struct HierarchyOptions {
     /// A step of the ladder that is not tried, to measure what it is worth; a result does not say
     /// so.
     pub without: Option<LadderStep>,
+    /// See [`Constants`]; a result does not say what they were.
+    pub constants: Constants,
 }
 
 impl Default for HierarchyOptions {
@@ -88,6 +91,7 @@ impl Default for HierarchyOptions {
             seams: Seams::default(),
             tolerance: CutTolerance::default(),
             without: None,
+            constants: Constants::default(),
         }
     }
 }

@@ -11,15 +11,7 @@
 //! it has far fewer triangles than its siblings. In [`TreeShape::Thesis`] resolutions are levels.
 
 use super::options::{HierarchyOptions, TreeShape};
-
-/// A chunk at the last resolution but one is a leaf up to so many times the triangles of others:
-/// cuts are not perfectly even, and another level for a few triangles more would be of tiny nodes.
-const LAST_STEP_TOLERANCE: f64 = 2.0;
-
-/// Cutting a chunk that is at the last resolution but one again pays where the pieces of a node
-/// shrink by at least this power of their number. Pieces of a surface shrink by its first power,
-/// those of triangles that reach all through a volume by its cube root: these would be cut for ever.
-const SHRINKING: f64 = 0.5;
+use crate::builder::constants::TreeConstants;
 
 /// A tree is not cut deeper than this many planes ([`crate::builder::border::vertex::PlaneSet`]
 /// holds 64, and each child is behind at most 6 more).
@@ -31,6 +23,7 @@ pub struct Resolutions {
     tree: TreeShape,
     desired_tris: f64,
     level_factor: f64,
+    constants: TreeConstants,
     /// Source triangles for one of a node, by resolution; the last is the leaves' and is 1.
     factors: Vec<f64>,
 }
@@ -75,7 +68,8 @@ impl Resolutions {
                 (0..=steps).rev().map(root).collect()
             }
         };
-        Self { tree: options.tree, desired_tris, level_factor, factors }
+        let constants = options.constants.tree;
+        Self { tree: options.tree, desired_tris, level_factor, constants, factors }
     }
 
     /// Source triangles for one of a node, by resolution, coarsest first; the last is 1.
@@ -105,8 +99,9 @@ impl Resolutions {
             return NodePlan::Leaf;
         }
         if next >= self.last() {
-            let most = LAST_STEP_TOLERANCE * self.level_factor.sqrt();
-            let shrunk = parent.triangles as f64 / libm::pow(self.level_factor, SHRINKING);
+            let most = self.constants.last_step_tolerance * self.level_factor.sqrt();
+            let shrunk =
+                parent.triangles as f64 / libm::pow(self.level_factor, self.constants.shrinking);
             let leaf = ratio < most || triangles as f64 > shrunk;
             return if leaf { NodePlan::Leaf } else { self.coarse(triangles, parent.resolution) };
         }

@@ -231,6 +231,7 @@ fn protect_material_borders(mesh: &Mesh, locks: &mut [SimplifyVertex]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::builder::constants::MeasureConstants;
     use crate::builder::error::MeanDistance;
     use crate::random::Random;
 
@@ -268,7 +269,7 @@ mod tests {
                 (along(&found) - along(mesh)).abs()
             });
             assert!(low.max(high) < 0.1 * (mesh.texcoords[24 * 25][0] - mesh.texcoords[0][0]));
-            MeanDistance::from(mesh).to(&found, f64::INFINITY)
+            MeanDistance::from(mesh, MeasureConstants::default()).to(&found, f64::INFINITY)
         };
         // Sizes of the picture are powers of two, which change no digit.
         let near = error(&mapped(0.0, 1.0 / 32.0));

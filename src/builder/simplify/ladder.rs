@@ -18,6 +18,7 @@
 use std::cmp::Ordering;
 
 use crate::builder::border::vertex::{Border, BorderVertexState, Path};
+use crate::builder::constants::{BoxConstants, Constants};
 use crate::builder::error::MeanDistance;
 use crate::builder::simplify::aggregate::{Aggregated, aggregate};
 use crate::builder::simplify::cluster::cluster;
@@ -57,13 +58,9 @@ pub struct Method<'a> {
     pub reorientable: &'a [bool],
     /// A step that is not tried, to measure what it is worth.
     pub without: Option<LadderStep>,
+    /// See [`Constants`].
+    pub constants: &'a Constants,
 }
-
-/// Edge collapse that moves the surface by more than this share of the side of a square as large as
-/// a triangle may have may have worn away what else would be kept, and is compared with other ways.
-/// Of what comparing everywhere gains, 80 to 99 % are gained so; of the nodes of scans, where
-/// hardly any gain, 5 % are compared.
-const DOUBTFUL: f64 = 0.2;
 
 /// Simplifies `mesh`, whose border is thinned already ([`crate::builder::border::thin`]), to at most about
 /// `target` triangles as a node of `path` at `level`.
@@ -75,7 +72,7 @@ pub fn simplify(
     target: usize,
     method: &Method,
 ) -> Simplified {
-    let &Method { simplifier, weights, up, reorientable, without } = method;
+    let &Method { simplifier, weights, up, reorientable, without, constants } = method;
     let tries = |step| without != Some(step);
     let (mesh, border) = compact(mesh, border);
     let locked: Vec<bool> = border
@@ -94,7 +91,7 @@ pub fn simplify(
     }
     let collapsed = |step| collapse(&source.mesh, &source.border, &locked, target, step, weights);
     let boxes = match tries(LadderStep::Boxes) {
-        true => boxes(&source, &locked, up, target, weights),
+        true => boxes(&source, &locked, up, target, weights, &constants.boxes),
         false => None,
     };
     let mut best = collapsed(LadderStep::Collapse);
@@ -105,10 +102,10 @@ pub fn simplify(
         }
     }
     let mut candidates = Vec::new();
-    let doubtful = DOUBTFUL * (source.mesh.area() / target as f64).sqrt();
+    let doubtful = constants.simplify.doubtful * (source.mesh.area() / target as f64).sqrt();
     if best.mesh.triangles.len() > limit
         || best.error > doubtful
-        || has_duplicate_faces(&source.mesh)
+        || has_duplicate_faces(&source.mesh, constants.simplify.few_faces)
     {
         if tries(LadderStep::Prune) {
             candidates.push(collapsed(LadderStep::Prune));
@@ -117,7 +114,8 @@ pub fn simplify(
             candidates.push(clustered(&source.mesh, &source.border, &locked, target));
         }
         if tries(LadderStep::Oriented) {
-            candidates.extend(wound(&source, &locked, target, weights, reorientable));
+            let few = constants.simplify.few_faces;
+            candidates.extend(wound(&source, &locked, target, weights, reorientable, few));
         }
     }
     candidates.extend(boxes);
@@ -125,7 +123,7 @@ pub fn simplify(
         return best;
     }
     let share = (source.mesh.area() / target as f64).sqrt();
-    let mut from_source = MeanDistance::from(&source.mesh);
+    let mut from_source = MeanDistance::from(&source.mesh, constants.measure);
     let mut rank = |candidate: &Simplified, best: (Rank, f64)| {
         let nearest = if best.0 == Rank::Near { best.1 } else { f64::INFINITY };
         let distance = || from_source.to(&candidate.mesh, nearest);
@@ -184,8 +182,9 @@ fn wound(
     target: usize,
     weights: AppearanceWeights,
     reorientable: &[bool],
+    few: f64,
 ) -> Option<Simplified> {
-    let triangles = oriented(&source.mesh, reorientable)?;
+    let triangles = oriented(&source.mesh, reorientable, few)?;
     let mesh = Mesh { triangles, ..source.mesh.clone() };
     let step = LadderStep::Oriented;
     if mesh.triangles.len() > target {
@@ -202,8 +201,9 @@ fn boxes(
     up: UpAxis,
     target: usize,
     weights: AppearanceWeights,
+    constants: &BoxConstants,
 ) -> Option<Simplified> {
-    let Aggregated { boxes, rest } = aggregate(&source.mesh, locked, up, target)?;
+    let Aggregated { boxes, rest } = aggregate(&source.mesh, locked, up, target, constants)?;
     let for_rest = target.saturating_sub(boxes.triangles.len()).max(1);
     let rest = Mesh { triangles: rest, ..source.mesh.clone() };
     let mut result = if rest.triangles.len() > for_rest {
@@ -232,6 +232,7 @@ fn clustered(mesh: &Mesh, border: &Border, locked: &[bool], target: usize) -> Si
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::builder::constants::MeasureConstants;
 
     #[test]
     fn a_budget_is_no_reason_to_leave_out_whole_sides() {
@@ -276,7 +277,8 @@ mod tests {
         let simplified = |target| {
             let weights = AppearanceWeights::default();
             let (simplifier, up, reorientable) = (Simplifier::Qem, UpAxis::Z, &[true][..]);
-            let method = Method { simplifier, weights, up, reorientable, without: None };
+            let constants = &Constants::default();
+            let method = Method { simplifier, weights, up, reorientable, without: None, constants };
             simplify(&mesh, &border, &Path::default(), 0, target, &method)
         };
         let few = simplified(600);
@@ -291,7 +293,9 @@ mod tests {
             LadderStep::Boxes,
             AppearanceWeights::default(),
         );
-        let to = |other: &Mesh| MeanDistance::from(&mesh).to(other, f64::INFINITY);
+        let to = |other: &Mesh| {
+            MeanDistance::from(&mesh, MeasureConstants::default()).to(other, f64::INFINITY)
+        };
         assert!(to(&few.mesh) < to(&alone.mesh), "{} {}", to(&few.mesh), to(&alone.mesh));
         assert_ne!(simplified(2400).step, LadderStep::Boxes, "enough for all");
     }

@@ -16,16 +16,12 @@ pub fn reorientable(material: &Material) -> bool {
     material.double_sided && material.alpha == AlphaMode::Opaque
 }
 
-/// Up to this share of faces that turn or go leaves edge collapse as free as it was. A closed
-/// surface that folded flat somewhere on a finer level has two faces in one place there; both stay,
-/// and it stays closed.
-const FEW: f64 = 0.02;
-
 /// The triangles with faces of one place become the first of them, and of neighbours that wind
-/// against each other those turned that are less in area; `None` where that changes few. Only
+/// against each other those turned that are less in area; `None` where that changes no more than this
+/// share of them (`few`). Only
 /// faces of materials that are [`reorientable`] change. Texture seams divide nothing here: places
 /// count, not vertices.
-pub fn oriented(mesh: &Mesh, reorientable: &[bool]) -> Option<Vec<[u32; 3]>> {
+pub fn oriented(mesh: &Mesh, reorientable: &[bool], few: f64) -> Option<Vec<[u32; 3]>> {
     let places = places_of(mesh);
     let at = |triangle: [u32; 3]| triangle.map(|vertex| places[vertex as usize]);
     let can_turn = |triangle: [u32; 3]| {
@@ -52,19 +48,19 @@ pub fn oriented(mesh: &Mesh, reorientable: &[bool]) -> Option<Vec<[u32; 3]>> {
         triangles[triangle as usize].swap(1, 2);
     }
     let changed = turning.len() + mesh.triangles.len() - triangles.len();
-    (changed as f64 > FEW * mesh.triangles.len() as f64).then_some(triangles)
+    (changed as f64 > few * mesh.triangles.len() as f64).then_some(triangles)
 }
 
-/// Whether more than a few faces lie where others do. The quadrics of such sheets know no border:
+/// Whether more than a `few` of the faces, a share, lie where others do. The quadrics of such sheets know no border:
 /// folded in at their rims they count as unchanged.
-pub fn has_duplicate_faces(mesh: &Mesh) -> bool {
+pub fn has_duplicate_faces(mesh: &Mesh, few: f64) -> bool {
     let hasher = FxBuildHasher;
     let hashes: Vec<u64> = mesh.positions.iter().map(|&p| hasher.hash_one(key(p))).collect();
     let mut seen = FxHashSet::default();
     seen.reserve(mesh.triangles.len());
     let sum = |t: &[u32; 3]| t.iter().fold(0, |sum: u64, &v| sum.wrapping_add(hashes[v as usize]));
     let again = mesh.triangles.iter().filter(|t| !seen.insert(sum(t))).count();
-    again as f64 > FEW * mesh.triangles.len() as f64
+    again as f64 > few * mesh.triangles.len() as f64
 }
 
 fn sides([a, b, c]: [u32; 3]) -> [(u32, u32); 3] {
@@ -129,6 +125,8 @@ fn to_turn(neighbors: &[Vec<(u32, bool)>], areas: &[f64]) -> Vec<u32> {
 mod tests {
     use super::*;
 
+    const FEW: f64 = 0.02;
+
     /// A sheet of squares in two triangles each.
     fn sheet(side: u32) -> Mesh {
         let mut mesh = Mesh::default();
@@ -155,13 +153,13 @@ mod tests {
     #[test]
     fn faces_turned_inside_out_turn_back() {
         let sound = sheet(8);
-        assert_eq!(oriented(&sound, &[true]), None);
+        assert_eq!(oriented(&sound, &[true], FEW), None);
         let mut mesh = sound.clone();
         for triangle in mesh.triangles.iter_mut().step_by(3) {
             triangle.swap(1, 2);
         }
-        assert_eq!(oriented(&mesh, &[false]), None, "drawn from one side alone");
-        mesh.triangles = oriented(&mesh, &[true]).unwrap();
+        assert_eq!(oriented(&mesh, &[false], FEW), None, "drawn from one side alone");
+        mesh.triangles = oriented(&mesh, &[true], FEW).unwrap();
         assert_eq!((mesh.triangles.len(), upward(&mesh)), (128, 128));
     }
 
@@ -173,12 +171,12 @@ mod tests {
         mesh.materials[81..].fill(1);
         let back = |t: &[u32; 3]| t.map(|vertex| backs[vertex as usize]);
         let turned: Vec<_> = mesh.triangles.iter().map(back).map(|[a, b, c]| [a, c, b]).collect();
-        assert!(!has_duplicate_faces(&mesh));
+        assert!(!has_duplicate_faces(&mesh, FEW));
         mesh.triangles.extend(turned);
-        assert!(has_duplicate_faces(&mesh));
-        let not_seen = oriented(&mesh, &[true, false]);
+        assert!(has_duplicate_faces(&mesh, FEW));
+        let not_seen = oriented(&mesh, &[true, false], FEW);
         assert_eq!(not_seen, None, "backs that are not seen from the front");
-        mesh.triangles = oriented(&mesh, &[true, true]).unwrap();
+        mesh.triangles = oriented(&mesh, &[true, true], FEW).unwrap();
         assert_eq!((mesh.triangles.len(), upward(&mesh)), (128, 128));
     }
 
@@ -200,7 +198,7 @@ mod tests {
             triangles
         };
         let before = sorted(&mesh.triangles);
-        if let Some(triangles) = oriented(&mesh, &[true]) {
+        if let Some(triangles) = oriented(&mesh, &[true], FEW) {
             assert_eq!(sorted(&triangles), before);
         }
     }

@@ -4,7 +4,14 @@ use crate::texture::BakeClasses;
 
 /// Without levels.
 fn rule() -> KeepRule<'static> {
-    KeepRule { shares: Vec::new(), most: Vec::new(), first_level: 1, collinear: 0.0, baked: None }
+    KeepRule {
+        shares: Vec::new(),
+        most: Vec::new(),
+        first_level: 1,
+        collinear: 0.0,
+        baked: None,
+        constants: Default::default(),
+    }
 }
 
 /// At x = 2 on a lattice of whole metres, without any tolerance.

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use super::*;
-use crate::builder::error::tests::mesh;
+use crate::builder::error::tests::{mesh, surface_of};
 use crate::mesh::Mesh;
 
 const SIDE: u32 = 12;
@@ -40,11 +40,13 @@ fn bounds(original: &Original) -> Vec<Option<f32>> {
 
 #[test]
 fn a_triangle_over_a_sheet_is_as_far_as_the_sheet_waves() {
-    let bounds = bounds(&Original::of(&sheet()));
+    let bounds = bounds(&surface_of(&sheet()));
     let found: Vec<f32> = bounds.iter().flatten().copied().collect();
     // From those that are under it.
     assert!(found.len() * 4 > bounds.len() && found.len() < bounds.len());
-    assert!(found.iter().all(|&bound| (0.05..=0.05f32.hypot(0.5 * ASIDE) * 1.01).contains(&bound)));
+    assert!(found.iter().all(|&bound| {
+        (0.05..=0.05f32.hypot(0.5 * MeasureConstants::default().aside) * 1.01).contains(&bound)
+    }));
 }
 
 /// Of two meshes that meet along a line.
@@ -56,11 +58,11 @@ fn walks_lead_from_part_to_part() {
         let of_half =
             |t: &&[u32; 3]| t.iter().all(|&v| whole.positions[v as usize][0] <= middle) == is_left;
         let triangles = whole.triangles.iter().filter(of_half).copied().collect();
-        Arc::new(Original::of(&Mesh { triangles, ..whole.clone() }))
+        Arc::new(surface_of(&Mesh { triangles, ..whole.clone() }))
     };
     let count = |bounds: Vec<Option<f32>>| bounds.into_iter().flatten().count();
     let of_halves = count(bounds(&Original::union(vec![half(true), half(false)])));
-    assert_eq!(of_halves, count(bounds(&Original::of(&whole))));
+    assert_eq!(of_halves, count(bounds(&surface_of(&whole))));
 }
 
 #[test]
@@ -74,7 +76,7 @@ fn nothing_is_proven_over_a_hole() {
     };
     let first = torn.triangles.iter().position(under).unwrap_or_default();
     torn.triangles.remove(first);
-    assert!(bounds(&Original::of(&torn)).iter().all(Option::is_none));
+    assert!(bounds(&surface_of(&torn)).iter().all(Option::is_none));
 }
 
 /// Edges have two triangles each, and yet there is nothing over part of the triangle.
@@ -87,7 +89,7 @@ fn nothing_is_proven_where_the_surface_turns_back() {
             (*x, *z) = (10.0 - *x, *z + 0.01);
         }
     }
-    assert!(bounds(&Original::of(&folded)).iter().all(Option::is_none));
+    assert!(bounds(&surface_of(&folded)).iter().all(Option::is_none));
 }
 
 #[test]
@@ -95,11 +97,11 @@ fn what_stands_out_is_too_far() {
     let mut spiked = sheet();
     let middle = SIDE * (SIDE / 3) + SIDE / 3;
     spiked.positions[middle as usize][2] = 0.6;
-    assert!(bounds(&Original::of(&spiked)).iter().all(Option::is_none));
+    assert!(bounds(&surface_of(&spiked)).iter().all(Option::is_none));
     // But not where only what is beside the triangle does.
     let mut beside = sheet();
     beside.positions[(SIDE * SIDE - 1) as usize][2] = 0.6;
-    assert!(bounds(&Original::of(&beside)).iter().any(Option::is_some));
+    assert!(bounds(&surface_of(&beside)).iter().any(Option::is_some));
 }
 
 /// A walk that fails may have settled triangles on its way, whose distance must count.
@@ -107,7 +109,7 @@ fn what_stands_out_is_too_far() {
 fn what_failed_walks_settle_counts() {
     let mut torn = sheet();
     torn.triangles.truncate(torn.triangles.len() * 2 / 3);
-    let original = Original::of(&torn);
+    let original = surface_of(&torn);
     let large = [[1.2, 1.1, 0.0], [9.7, 2.3, 0.0], [4.1, 9.4, 0.0]];
     let large = Triangle::new(large.map(Vec3::from));
     let mut overlay = Overlay::new(&original);

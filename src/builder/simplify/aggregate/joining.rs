@@ -7,19 +7,14 @@ use glam::DVec2;
 use rustc_hash::FxHashMap;
 
 use super::solid::Solid;
-
-/// From afar only the mean is seen: area that is gone counts so many times what is elsewhere.
-const NET: f64 = 3.0;
-
-/// Neighbours of a box that it may be joined with at first.
-const NEIGHBOURS: usize = 8;
+use crate::builder::constants::BoxConstants;
 
 /// Joins or leaves out boxes, the least change first, until at most `most` are left.
-pub(super) fn join_down_to(solids: &mut Vec<Solid>, most: usize) {
+pub(super) fn join_down_to(solids: &mut Vec<Solid>, most: usize, constants: &BoxConstants) {
     if solids.len() <= most {
         return;
     }
-    let mut joining = Joining::new(std::mem::take(solids));
+    let mut joining = Joining::new(std::mem::take(solids), constants);
     while joining.left > most && joining.step() {}
     solids.extend(joining.solids.into_iter().flatten());
 }
@@ -38,14 +33,17 @@ struct Joining {
     neighbours: Vec<Vec<usize>>,
     steps: BinaryHeap<Reverse<Step>>,
     left: usize,
+    /// See [`BoxConstants`].
+    net: f64,
 }
 
 impl Joining {
-    fn new(solids: Vec<Solid>) -> Self {
-        let neighbours = neighbours(&solids);
+    fn new(solids: Vec<Solid>, constants: &BoxConstants) -> Self {
+        let neighbours = neighbours(&solids, constants.neighbours);
         let left = solids.len();
         let solids = solids.into_iter().map(Some).collect();
-        let mut joining = Self { solids, neighbours, steps: BinaryHeap::new(), left };
+        let net = constants.net;
+        let mut joining = Self { solids, neighbours, steps: BinaryHeap::new(), left, net };
         for number in 0..left {
             joining.offer(number);
         }
@@ -55,10 +53,11 @@ impl Joining {
     /// Offers to leave a box out and to join it with each of its neighbours of lower number.
     fn offer(&mut self, number: usize) {
         let Some(solid) = &self.solids[number] else { return };
-        let mut steps = vec![Step { change: NET * seen(solid), first: number, second: number }];
+        let mut steps =
+            vec![Step { change: self.net * seen(solid), first: number, second: number }];
         for &other in self.neighbours[number].iter().filter(|&&other| other < number) {
             if let Some(neighbour) = &self.solids[other] {
-                let change = change(solid, neighbour, &solid.joined(neighbour));
+                let change = change(solid, neighbour, &solid.joined(neighbour), self.net);
                 steps.push(Step { change, first: number, second: other });
             }
         }
@@ -99,11 +98,11 @@ fn seen(solid: &Solid) -> f64 {
 
 /// How much of what is seen from above and along both of the joined box's axes changes where it
 /// stands for two, square metres.
-fn change(a: &Solid, b: &Solid, joined: &Solid) -> f64 {
+fn change(a: &Solid, b: &Solid, joined: &Solid, net: f64) -> f64 {
     let axes = [joined.axis, joined.axis.perp()];
     let [along, across] = axes.map(|axis| [a, b, joined].map(|solid| interval(solid, axis)));
     let up = [a, b, joined].map(|solid| [solid.low, solid.high]);
-    difference(along, across) + difference(along, up) + difference(across, up)
+    difference(along, across, net) + difference(along, up, net) + difference(across, up, net)
 }
 
 /// A box's extent along an axis.
@@ -113,9 +112,9 @@ fn interval(solid: &Solid, axis: DVec2) -> [f64; 2] {
 }
 
 /// The area that is in one of two rectangles but not in the third, or in the third alone, which
-/// counts more as far as one is not made up for by the other; each is the product of an `x` and a
+/// counts `net` times as far as one is not made up for by the other; each is the product of an `x` and a
 /// `y`.
-fn difference(x: [[f64; 2]; 3], y: [[f64; 2]; 3]) -> f64 {
+fn difference(x: [[f64; 2]; 3], y: [[f64; 2]; 3], net: f64) -> f64 {
     let common = |of: &[usize]| {
         let length = |sides: [[f64; 2]; 3]| {
             let low = of.iter().map(|&i| sides[i][0]).fold(f64::NEG_INFINITY, f64::max);
@@ -127,11 +126,11 @@ fn difference(x: [[f64; 2]; 3], y: [[f64; 2]; 3]) -> f64 {
     let either = common(&[0]) + common(&[1]) - common(&[0, 1]);
     let shared = common(&[0, 2]) + common(&[1, 2]) - common(&[0, 1, 2]);
     let (lost, added) = (either - shared, common(&[2]) - shared);
-    lost + added + (NET - 1.0) * (lost - added).abs()
+    lost + added + (net - 1.0) * (lost - added).abs()
 }
 
-/// The nearest boxes of each, both ways, by a grid with about two to a cell.
-fn neighbours(solids: &[Solid]) -> Vec<Vec<usize>> {
+/// The nearest boxes of each, `most` of them, both ways, by a grid with about two to a cell.
+fn neighbours(solids: &[Solid], most: usize) -> Vec<Vec<usize>> {
     let low = solids.iter().fold(DVec2::INFINITY, |low, solid| low.min(solid.centre));
     let high = solids.iter().fold(DVec2::NEG_INFINITY, |high, solid| high.max(solid.centre));
     let size = (high - low).max(DVec2::splat(1e-9));
@@ -153,7 +152,7 @@ fn neighbours(solids: &[Solid]) -> Vec<Vec<usize>> {
             .map(|&other| (solids[other].centre.distance_squared(solid.centre), other))
             .collect();
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for &(_, other) in near.iter().take(NEIGHBOURS) {
+        for &(_, other) in near.iter().take(most) {
             neighbours[number].push(other);
             neighbours[other].push(number);
         }
@@ -198,7 +197,7 @@ mod tests {
         let mut solids: Vec<Solid> = (0..6).map(|i| house(10.5 * f64::from(i))).collect();
         solids.push(Solid::plain(dvec2(20.0, 30.0), dvec2(2.0, 2.0), 0.0, 60.0));
         solids.push(Solid::plain(dvec2(40.0, 15.0), dvec2(0.5, 0.5), 0.0, 1.0));
-        join_down_to(&mut solids, 2);
+        join_down_to(&mut solids, 2, &BoxConstants::default());
         assert_eq!(solids.len(), 2);
         assert_eq!((solids[0].high, solids[0].footprint), (60.0, 16.0), "the tower");
         let row = solids[1];
@@ -212,10 +211,10 @@ mod tests {
     fn what_changes_is_nothing_where_the_joined_box_is_both() {
         let a = Solid::plain(dvec2(0.0, 0.0), dvec2(1.0, 2.0), 0.0, 3.0);
         let b = Solid::plain(dvec2(2.0, 0.0), dvec2(1.0, 2.0), 0.0, 3.0);
-        assert!(change(&a, &b, &a.joined(&b)).abs() < 1e-9);
+        assert!(change(&a, &b, &a.joined(&b), 3.0).abs() < 1e-9);
         // A gap of 1 m by 4 m: seen from above and from one side; the box keeps the footprint.
         let c = Solid::plain(dvec2(3.0, 0.0), dvec2(1.0, 2.0), 0.0, 3.0);
-        assert!(change(&a, &c, &a.joined(&c)) > 1.0);
+        assert!(change(&a, &c, &a.joined(&c), 3.0) > 1.0);
     }
 
     #[test]
@@ -230,7 +229,7 @@ mod tests {
             solids.iter().map(|solid| solid.footprint * (solid.high - solid.low)).sum()
         };
         let before = volume(&solids);
-        join_down_to(&mut solids, 30);
+        join_down_to(&mut solids, 30, &BoxConstants::default());
         assert_eq!(solids.len(), 30);
         let after = volume(&solids);
         assert!(after <= before * (1.0 + 1e-9) && after > before * 0.5, "{before} {after}");

@@ -18,13 +18,8 @@ use self::bodies::{Part, parts};
 use self::frame::Frame;
 use self::joining::join_down_to;
 use self::solid::Solid;
+use crate::builder::constants::BoxConstants;
 use crate::mesh::{Mesh, UpAxis};
-
-/// A body whose share of the budget, by its surface, is at least this many triangles keeps its form.
-const ENOUGH_TRIANGLES: f64 = 24.0;
-
-/// Boxes pay where the budget leaves fewer triangles than this to a body.
-const TRIANGLES_PER_BODY: usize = 12;
 
 /// A mesh whose small bodies are boxes.
 pub struct Aggregated {
@@ -37,13 +32,19 @@ pub struct Aggregated {
 /// Replaces the small bodies of an untextured `mesh` by boxes, so that some `target` triangles are
 /// left for all if the rest is simplified too; `None` where there are too few to be worth it.
 /// Nothing that has a `locked` vertex is replaced.
-pub fn aggregate(mesh: &Mesh, locked: &[bool], up: UpAxis, target: usize) -> Option<Aggregated> {
+pub fn aggregate(
+    mesh: &Mesh,
+    locked: &[bool],
+    up: UpAxis,
+    target: usize,
+    constants: &BoxConstants,
+) -> Option<Aggregated> {
     if !mesh.texcoords.is_empty() {
         return None;
     }
     let frame = Frame::of(up);
     let parts = parts(mesh);
-    if parts.len() * TRIANGLES_PER_BODY <= target {
+    if parts.len() * constants.triangles_per_body <= target {
         return None;
     }
     let area: f64 = parts.iter().map(|part| part.area).sum();
@@ -51,8 +52,8 @@ pub fn aggregate(mesh: &Mesh, locked: &[bool], up: UpAxis, target: usize) -> Opt
     let (mut solids, mut boxed_area, mut rest) = (Vec::new(), 0.0, Vec::new());
     for part in parts {
         let is_free = || !part.triangles.iter().flatten().any(|&vertex| locked[vertex as usize]);
-        let solid = (share(part.area) < ENOUGH_TRIANGLES && is_free())
-            .then(|| Solid::of(mesh, &part.triangles, frame))
+        let solid = (share(part.area) < constants.enough_triangles && is_free())
+            .then(|| Solid::of(mesh, &part.triangles, frame, constants))
             .flatten();
         match solid {
             Some(solid) => {
@@ -62,7 +63,7 @@ pub fn aggregate(mesh: &Mesh, locked: &[bool], up: UpAxis, target: usize) -> Opt
             None => rest.push(part),
         }
     }
-    if solids.len() * TRIANGLES_PER_BODY <= target / 2 {
+    if solids.len() * constants.triangles_per_body <= target / 2 {
         return None;
     }
     // What the rest does not need is there for boxes.
@@ -70,7 +71,7 @@ pub fn aggregate(mesh: &Mesh, locked: &[bool], up: UpAxis, target: usize) -> Opt
         rest.into_iter().flat_map(|Part { triangles, .. }| triangles).collect();
     let for_boxes = share(boxed_area).max(target as f64 - rest.len() as f64);
     let most = (for_boxes / solid::TRIANGLES as f64) as usize;
-    join_down_to(&mut solids, most.max(1));
+    join_down_to(&mut solids, most.max(1), constants);
     let mut boxes = Mesh::default();
     for solid in &solids {
         solid.add_to(&mut boxes, mesh, frame);
@@ -112,7 +113,8 @@ mod tests {
     fn a_town_becomes_boxes_and_keeps_its_ground_and_what_is_locked() {
         let mesh = town();
         let free = vec![false; mesh.positions.len()];
-        let Aggregated { boxes, rest } = aggregate(&mesh, &free, UpAxis::Z, 300).unwrap();
+        let Aggregated { boxes, rest } =
+            aggregate(&mesh, &free, UpAxis::Z, 300, &BoxConstants::default()).unwrap();
         assert_eq!(rest.len(), 1, "the ground");
         let count = boxes.triangles.len();
         assert!((200..=300).contains(&count) && count.is_multiple_of(solid::TRIANGLES), "{count}");
@@ -123,7 +125,8 @@ mod tests {
         }
         let mut locked = free;
         locked[0] = true;
-        let kept = aggregate(&mesh, &locked, UpAxis::Z, 300).unwrap().rest;
+        let kept =
+            aggregate(&mesh, &locked, UpAxis::Z, 300, &BoxConstants::default()).unwrap().rest;
         assert_eq!(kept.len(), 1 + 14);
         assert!(kept.iter().flatten().any(|&vertex| vertex == 0));
     }
@@ -132,6 +135,6 @@ mod tests {
     fn nothing_is_replaced_where_the_budget_does_for_all() {
         let mesh = town();
         let free = vec![false; mesh.positions.len()];
-        assert!(aggregate(&mesh, &free, UpAxis::Z, 1300).is_none());
+        assert!(aggregate(&mesh, &free, UpAxis::Z, 1300, &BoxConstants::default()).is_none());
     }
 }

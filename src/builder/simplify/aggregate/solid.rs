@@ -3,19 +3,11 @@
 use glam::{DVec2, dvec2};
 
 use super::frame::Frame;
+use crate::builder::constants::BoxConstants;
 use crate::mesh::{Mesh, wide};
 
 /// Of one box, without a floor, which nobody sees.
 pub(super) const TRIANGLES: usize = 10;
-
-/// A body is at least this high for the side of a square as large as its footprint, and has at
-/// least these shares of its box's walls and volume: a sloping road has neither.
-const LEAST_HEIGHT: f64 = 0.1;
-const LEAST_WALLS: f64 = 0.3;
-const LEAST_VOLUME: f64 = 0.5;
-
-/// A surface is a wall where its normal's rise is at most this.
-const WALL_RISE: f64 = 0.5;
 
 /// What a side of a box looks like.
 #[derive(Clone, Copy)]
@@ -89,7 +81,12 @@ impl LookSum {
 impl Solid {
     /// The box of as much footprint as the body, as high as its roofs are on average; `None` for
     /// what has no roof, is flat, or has hardly any walls or volume.
-    pub(super) fn of(mesh: &Mesh, triangles: &[[u32; 3]], frame: Frame) -> Option<Self> {
+    pub(super) fn of(
+        mesh: &Mesh,
+        triangles: &[[u32; 3]],
+        frame: Frame,
+        constants: &BoxConstants,
+    ) -> Option<Self> {
         let at = |vertex: u32| frame.upright(wide(mesh.positions[vertex as usize]));
         let mut sums = Sums::default();
         for &triangle in triangles {
@@ -98,7 +95,7 @@ impl Solid {
             let area = normal.length();
             sums.rise += normal.z;
             sums.rise_heights += normal.z * (a.z + b.z + c.z) / 3.0;
-            if normal.z.abs() <= WALL_RISE * area {
+            if normal.z.abs() <= constants.wall_rise * area {
                 let along = dvec2(normal.x, normal.y);
                 sums.directions += along.length() * turned_four_times(along);
                 sums.wall.add(mesh, triangle, area);
@@ -123,9 +120,10 @@ impl Solid {
         let footprint = sums.footprint.min(4.0 * around.x * around.y);
         let solid = Self { centre, around, footprint, axis, low, high, roof, wall };
         let walls = 4.0 * solid.half().element_sum() * (high - low);
-        let is_body = high - low > LEAST_HEIGHT * footprint.sqrt()
-            && sums.wall.area >= LEAST_WALLS * walls
-            && sums.rise_heights - sums.rise * low >= LEAST_VOLUME * footprint * (high - low);
+        let volume = sums.rise_heights - sums.rise * low;
+        let is_body = high - low > constants.least_height * footprint.sqrt()
+            && sums.wall.area >= constants.least_walls * walls
+            && volume >= constants.least_volume * footprint * (high - low);
         is_body.then_some(solid)
     }
 
@@ -275,7 +273,9 @@ mod tests {
     fn the_box_of_a_box_is_itself_whichever_axis_is_up() {
         for up in [UpAxis::Z, UpAxis::Y] {
             let house = house(up);
-            let solid = Solid::of(&house, &house.triangles, Frame::of(up)).unwrap();
+            let solid =
+                Solid::of(&house, &house.triangles, Frame::of(up), &BoxConstants::default())
+                    .unwrap();
             assert!((solid.footprint - 32.0).abs() < 1e-3, "{}", solid.footprint);
             assert!((solid.low - 1.0).abs() < 1e-5 && (solid.high - 4.0).abs() < 1e-5);
             let mut boxes = Mesh::default();
@@ -304,24 +304,37 @@ mod tests {
     fn what_is_flat_or_has_no_roof_is_no_body() {
         let house = house(UpAxis::Z);
         let frame = Frame::of(UpAxis::Z);
-        assert!(Solid::of(&house, &house.triangles[..2], frame).is_none(), "a roof alone");
-        assert!(Solid::of(&house, &house.triangles[4..], frame).is_none(), "walls alone");
+        assert!(
+            Solid::of(&house, &house.triangles[..2], frame, &BoxConstants::default()).is_none(),
+            "a roof alone"
+        );
+        assert!(
+            Solid::of(&house, &house.triangles[4..], frame, &BoxConstants::default()).is_none(),
+            "walls alone"
+        );
         let mut slope = house.clone();
         for place in &mut slope.positions {
             place[2] = place[0] * 0.4;
         }
-        assert!(Solid::of(&slope, &slope.triangles[..2], frame).is_none(), "a slope");
+        assert!(
+            Solid::of(&slope, &slope.triangles[..2], frame, &BoxConstants::default()).is_none(),
+            "a slope"
+        );
         let mut ramp = house;
         for place in &mut ramp.positions {
             place[2] = place[2] * 0.1 + place[0] * 0.4;
         }
-        assert!(Solid::of(&ramp, &ramp.triangles, frame).is_none(), "a ramp");
+        assert!(
+            Solid::of(&ramp, &ramp.triangles, frame, &BoxConstants::default()).is_none(),
+            "a ramp"
+        );
     }
 
     #[test]
     fn joined_boxes_keep_their_volume_and_base() {
         let house = house(UpAxis::Z);
-        let a = Solid::of(&house, &house.triangles, Frame::of(UpAxis::Z)).unwrap();
+        let a = Solid::of(&house, &house.triangles, Frame::of(UpAxis::Z), &BoxConstants::default())
+            .unwrap();
         let b = Solid {
             centre: a.centre + dvec2(12.0, 3.0),
             low: a.low + 1.0,

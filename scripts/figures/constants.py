@@ -1,0 +1,172 @@
+"""What each constant of the builder does to distance, bytes and time; see scripts/constants."""
+
+import json
+import math
+import os
+import resource
+import shutil
+import subprocess
+
+from common import DOCS, Options, Programs, machine, real_data, say, table, write_between_markers
+
+SETS = [
+    "oblique_a",
+    "ingolstadt",
+    "torcs_street1",
+    "hamada",
+    "wageningen",
+    "lyon_houses",
+    "3dfier",
+]
+CITY = {"blocks": 9, "triangles": 100_000, "texels_per_triangle": 17}
+# Fronts of this share of the leaves' triangles are compared: below the roots of none of the sets.
+FRONT = 0.25
+
+# Where half and twice are not what to try.
+TRIED = {
+    ("blocks", "large_group"): (100, 1600),
+    ("tree", "last_step_tolerance"): (1.0, 4.0),
+    ("tree", "shrinking"): (0.34, 1.0),
+    ("cut", "shortest_side"): (0.1, 0.6),
+    ("cut", "least_share"): (0.25, 0.9),
+    ("cut", "uneven_triangles"): (2.0, 32.0),
+    ("cut", "uneven_space"): (0.0, 2.0),
+    ("cut", "uncut"): (0.0, 1.0),
+    ("border", "line_weight"): (0.0, 2.0),
+    ("border", "triangle_height"): (1.0, 4.0),
+    ("border", "overhang"): (0.0, 0.5),
+    ("border", "overhang_heights"): (1.0, 16.0),
+    ("border", "shared_height"): (2.0, 32.0),
+    ("border", "shared_height_most"): (2.0, 5.0),
+    ("simplify", "few_faces"): (0.0, 0.1),
+    ("boxes", "least_height"): (0.0, 0.3),
+    ("boxes", "least_walls"): (0.1, 0.6),
+    ("boxes", "least_volume"): (0.2, 0.8),
+    ("boxes", "wall_rise"): (0.2, 0.7),
+    ("boxes", "net"): (1.0, 6.0),
+    ("measure", "least_points"): (64, 512),
+    ("measure", "most_points"): (256, 2048),
+    ("measure", "aside"): (0.1, 0.6),
+    ("measure", "most_smaller"): (0.5, 0.99),
+    ("measure", "near_enough"): (0.0, 1.0),
+    ("measure", "much_larger"): (2.0, 128.0),
+}
+
+
+def main():
+    quick = "two constants on two sets"
+    runs = ("the fastest of how many builds, thrice as many for those of measuring", 1)
+    arguments = Options("constants", __doc__, quick, runs).parse()
+    programs = Programs(examples=["build_with"])
+    sets = {name: real_data(name) for name in SETS}
+    sets["a city"] = [programs.city("constants", **CITY)]
+    sets = {name: models for name, models in sets.items() if models}
+    defaults = json.loads(subprocess.check_output([programs.path("examples/build_with"), "{}"]))
+    if arguments.quick:
+        sets = dict(list(sets.items())[1:3])
+        defaults = {"cut": {"row": defaults["cut"]["row"], "uncut": defaults["cut"]["uncut"]}}
+    head = ["", "", "distance", "bytes", "seconds", "moved most"]
+    parts = []
+    for group, constants in defaults.items():
+        rows = []
+        for name, value in constants.items():
+            low, high = TRIED.get((group, name), (halved(value), 2 * value))
+            changes = [{"constants": {group: {name: tried}}} for tried in (low, high)]
+            # Of these all that may change is the time.
+            runs = arguments.runs * (3 if group == "measure" else 1)
+            whole, *results = built(programs, sets, [{}, *changes], runs)
+            for tried, result in zip((low, high), results):
+                say(f"{group}.{name} = {tried}")
+                rows.append([f"`{name}` {value}", f"{tried}", *compared(result, whole)])
+        parts += [f"### `{group}`", table(head, rows).rstrip()]
+    text = "\n\n".join([machine(), *parts]) + "\n"
+    print(text)
+    if arguments.write:
+        write_between_markers(DOCS / "constants.md", "figures", text)
+
+
+def halved(value):
+    return max(1, value // 2) if isinstance(value, int) else value / 2
+
+
+def built(programs, sets, changes, runs):
+    """Of each of some changes, what builds of each set are like."""
+    results = [{} for _ in changes]
+    for name, models in sets.items():
+        tries = [[one(programs, models, change) for change in changes] for _ in range(runs)]
+        for of_change, result in zip(zip(*tries), results):
+            result[name] = min(of_change, key=lambda built: built["seconds"])
+    return results
+
+
+def one(programs, models, changes):
+    out = programs.work / f"constants-{os.getpid()}"
+    shutil.rmtree(out, ignore_errors=True)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    build = [programs.path("examples/build_with"), json.dumps(changes)]
+    subprocess.run([*build, *map(str, models), str(out)], check=True)
+    seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    inspect = [programs.path("hlod-build"), "inspect", "--json", str(out)]
+    scene = json.loads(subprocess.check_output(inspect))
+    size = sum(path.stat().st_size for path in out.rglob("*.glb"))
+    size += sum(texture["file_bytes"] for texture in scene["shared_textures"])
+    record = (out / "scene.hlod").read_bytes()
+    shutil.rmtree(out)
+    return {"distance": front(scene["nodes"]), "bytes": size, "seconds": seconds, "scene": record}
+
+
+def front(nodes):
+    """The mean distance, metres, of a front refined where the stored error is largest.
+
+    Nodes count with the triangles of the leaves below them. What the last step of refining leaves
+    of the triangles that are allowed is made up for as if the distance were as their inverse.
+    """
+    children, weight = {}, {}
+    for node in nodes:
+        children.setdefault(node["parent"], []).append(node)
+    for node in sorted(nodes, key=lambda node: -node["level"]):
+        below = children.get(node["id"], [])
+        weight[node["id"]] = sum(weight[child["id"]] for child in below) or node["triangles"]
+    chosen = {node["id"]: node for node in children[None]}
+    left = FRONT * sum(node["triangles"] for node in nodes if node["id"] not in children)
+    allowed = left
+    left -= sum(node["triangles"] for node in chosen.values())
+    while True:
+        finer = [node for node in chosen.values() if node["id"] in children]
+        if not finer:
+            break
+        node = max(finer, key=lambda node: (node["geometric_error"], node["id"]))
+        more = sum(child["triangles"] for child in children[node["id"]]) - node["triangles"]
+        if more > left:
+            break
+        left -= more
+        del chosen[node["id"]]
+        chosen.update({child["id"]: child for child in children[node["id"]]})
+    total = sum(weight[node] for node in chosen)
+    mean = sum(weight[key] * node["mean_error"] for key, node in chosen.items()) / total
+    return mean * (1 - left / allowed)
+
+
+def compared(result, whole):
+    if all(result[name]["scene"] == whole[name]["scene"] for name in whole):
+        return ["same", "same", f"{seconds(result) / seconds(whole) - 1:+.0%}", ""]
+    changes = {name: result[name]["distance"] / whole[name]["distance"] for name in whole}
+    distance = math.exp(sum(map(math.log, changes.values())) / len(changes))
+    size = math.exp(
+        sum(math.log(result[name]["bytes"] / whole[name]["bytes"]) for name in whole) / len(whole)
+    )
+    most = max(changes, key=lambda name: abs(math.log(changes[name])))
+    return [
+        f"{distance - 1:+.1%}",
+        f"{size - 1:+.1%}",
+        f"{seconds(result) / seconds(whole) - 1:+.0%}",
+        f"{most}: {changes[most] - 1:+.1%}",
+    ]
+
+
+def seconds(results):
+    return sum(result["seconds"] for result in results.values())
+
+
+if __name__ == "__main__":
+    main()
