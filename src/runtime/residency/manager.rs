@@ -2,6 +2,7 @@
 
 use super::ledger::Ledger;
 use super::room::Promises;
+use super::state::{Counters, NodeState, Residency};
 use super::worth::Worth;
 use super::{PriorityList, ResidencyOptions, Sizes};
 use crate::runtime::SceneTree;
@@ -9,26 +10,6 @@ use crate::{Error, Result};
 
 /// How many nodes are tried, in order of priority, before loading waits for memory.
 const CANDIDATES: usize = 16;
-
-/// Where a node is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NodeState {
-    /// On disk only.
-    Absent,
-    /// Being read, or suspended; this many bytes of its files have been.
-    Loading {
-        /// Bytes read.
-        read: u64,
-    },
-    /// Read and decoded, not yet where drawing can use it.
-    Loaded,
-    /// Ready to be drawn.
-    Resident,
-    /// Given up; its memory is free once drawing lets go of it.
-    Leaving,
-    /// Its files cannot be used.
-    Broken,
-}
 
 /// A portion to be read: bytes `from..from + bytes` of the node's file followed by those of the
 /// shared pictures that it needs and that are not in memory.
@@ -51,65 +32,6 @@ pub struct Changes {
     pub left: Vec<u32>,
     /// Shared pictures whose memory is to be freed.
     pub left_textures: Vec<u32>,
-}
-
-/// What has happened so far.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct Counters {
-    /// Bytes of files that were read.
-    pub read_bytes: u64,
-    /// Nodes that were loaded.
-    pub loads: u64,
-    /// Nodes that made room.
-    pub evictions: u64,
-    /// Loads that were suspended for a more important one.
-    pub suspensions: u64,
-    /// Loads that were given up half way.
-    pub abandoned: u64,
-}
-
-/// Which nodes are in memory.
-///
-/// A node is loaded only once its parent is resident, and makes room only once none of its
-/// children is in memory, so that whatever is drawn can always be replaced by its parent. Roots
-/// never leave.
-#[derive(Clone, Debug)]
-pub struct Residency {
-    pub(super) options: ResidencyOptions,
-    pub(super) sizes: Sizes,
-    pub(super) ledger: Ledger,
-    pub(super) list: PriorityList,
-    pub(super) states: Vec<NodeState>,
-    pub(super) parents: Vec<Option<u32>>,
-    /// By node: children that are not absent.
-    pub(super) children_held: Vec<u32>,
-    /// By node: bytes to be read in all, fixed when its load begins.
-    pub(super) to_read: Vec<u64>,
-    /// By shared picture: whether it is in memory.
-    pub(super) textures_held: Vec<bool>,
-    /// By node: the frame in which it was visited last.
-    pub(super) visited: Vec<u64>,
-    pub(super) worth: Worth,
-    /// By node: the last frame in which it was drawn, or its children were visited in its place.
-    pub(super) needed: Vec<u64>,
-    pub(super) frame: u64,
-    /// Nodes that the last frame visited and that were not resident.
-    missed: Vec<u32>,
-    /// Loaded, in the order in which they were.
-    arrivals: Vec<u32>,
-    /// Leaving.
-    pub(super) leaving: Vec<u32>,
-    /// Shared pictures in memory that only a load needed that was given up; drawing lets go of
-    /// them, and their memory is free, at the next frame.
-    orphans: Vec<u32>,
-    /// Being read or suspended.
-    pub(super) loading: Vec<u32>,
-    /// The load that was given the last portion.
-    current: Option<u32>,
-    pub(super) resident: usize,
-    /// Where [`Residency::stale`] goes on.
-    cursor: usize,
-    pub(super) counters: Counters,
 }
 
 impl Residency {
@@ -165,53 +87,10 @@ impl Residency {
         ledger.peak()
     }
 
-    /// Bytes of the files that loading a node reads.
-    pub(super) fn files(&self, node: u32, held: &[bool]) -> u64 {
-        let size = &self.sizes.nodes[node as usize];
-        let missing = size.textures.iter().filter(|&&texture| !held[texture as usize]);
-        size.file_bytes + missing.map(|&t| self.sizes.textures[t as usize].file_bytes).sum::<u64>()
-    }
-
-    /// Where a node is.
-    pub fn state(&self, node: u32) -> NodeState {
-        self.states[node as usize]
-    }
-
-    /// Bytes that the load of a node reads in all.
-    #[cfg(test)]
-    pub(super) fn files_of_load(&self, node: u32) -> u64 {
-        self.to_read[node as usize]
-    }
-
-    /// Whether a shared picture is in memory, or arrives with a node that is loaded.
-    pub fn has_texture(&self, texture: u32) -> bool {
-        self.textures_held[texture as usize]
-    }
-
-    /// Bytes in use: held for drawing, decoded, and read by loads under way.
-    pub fn used_bytes(&self) -> u64 {
-        self.ledger.used()
-    }
-
-    /// The most bytes that were ever in use.
-    pub fn peak_bytes(&self) -> u64 {
-        self.ledger.peak()
-    }
-
-    /// Number of nodes that can be drawn.
-    pub fn resident(&self) -> usize {
-        self.resident
-    }
-
     /// Nodes that the last frame visited and found not in memory, and that still are not: how many
     /// loads wait.
     pub fn waiting(&self) -> usize {
         self.missed.iter().filter(|&&node| self.wants(node)).count()
-    }
-
-    /// What has happened so far.
-    pub fn counters(&self) -> Counters {
-        self.counters
     }
 
     /// Begins to load a root, before the first frame: all of its files are to be read, after
@@ -382,45 +261,5 @@ impl Residency {
         }
         self.resident += taken;
         changes
-    }
-
-    fn begin(&mut self, node: u32) {
-        let read = self.files(node, &self.textures_held);
-        self.to_read[node as usize] = read;
-        self.ledger.reserve(&self.sizes, node, read);
-        self.states[node as usize] = NodeState::Loading { read: 0 };
-        self.loading.push(node);
-        if let Some(parent) = self.parents[node as usize] {
-            self.children_held[parent as usize] += 1;
-        }
-    }
-
-    pub(super) fn end_reading(&mut self, node: u32) {
-        self.ledger.release_read(self.to_read[node as usize]);
-        self.loading.retain(|&other| other != node);
-    }
-
-    /// Gives back what was reserved for a load that will not be finished.
-    pub(super) fn forget_load(&mut self, node: u32, state: NodeState) {
-        let (held, orphans) = (&self.textures_held, &mut self.orphans);
-        self.ledger.release_load(&self.sizes, node, held, orphans);
-        self.states[node as usize] = state;
-        if let Some(parent) = self.parents[node as usize] {
-            self.children_held[parent as usize] -= 1;
-        }
-    }
-
-    /// Gives back what a node held.
-    fn forget(&mut self, node: u32, state: NodeState, gone: &mut Vec<u32>) {
-        let held = &mut self.textures_held;
-        self.ledger.release(&self.sizes, node, |texture| {
-            if std::mem::take(&mut held[texture as usize]) {
-                gone.push(texture);
-            }
-        });
-        self.states[node as usize] = state;
-        if let Some(parent) = self.parents[node as usize] {
-            self.children_held[parent as usize] -= 1;
-        }
     }
 }

@@ -8,11 +8,13 @@ mod manager;
 mod options;
 mod room;
 mod sizes;
+mod state;
 #[cfg(test)]
 mod tests;
 mod worth;
 
 pub use list::PriorityList;
-pub use manager::{Changes, Counters, NodeState, Residency, Step};
+pub use manager::{Changes, Step};
 pub use options::ResidencyOptions;
 pub use sizes::{NodeSize, Sizes, TextureSize};
+pub use state::{Counters, NodeState, Residency};

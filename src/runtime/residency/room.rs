@@ -1,7 +1,6 @@
 //! What makes room for a node.
 
-use super::Residency;
-use super::manager::NodeState;
+use super::state::{NodeState, Residency};
 
 /// Room that is kept for nodes until they can begin to load, in order of their priority.
 #[derive(Debug, Default)]
