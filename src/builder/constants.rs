@@ -179,7 +179,7 @@ pub struct SimplifyConstants {
 
 impl Default for SimplifyConstants {
     fn default() -> Self {
-        Self { doubtful: 0.2, few_faces: 0.02 }
+        Self { doubtful: 0.1, few_faces: 0.02 }
     }
 }
 
@@ -228,12 +228,8 @@ impl Default for BoxConstants {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MeasureConstants {
-    /// Points of a surface for the mean, for each of its triangles, 1 or more.
-    pub points_per_triangle: usize,
-    /// But at least so many, 1 or more: fewer leave means of small surfaces to chance.
-    pub least_points: usize,
-    /// And at most so many, not below the least: more only cost time.
-    pub most_points: usize,
+    /// Points of a surface for the mean, 1 or more: fewer leave it to chance, more cost time.
+    pub points: usize,
     /// Leaves whose first triangles are measured before all others, 1 or more.
     pub seeds: usize,
     /// A triangle that is walked over is made smaller by moving its corners inward by this share of
@@ -245,9 +241,6 @@ pub struct MeasureConstants {
     pub most_smaller: f32,
     /// More triangles are not visited on one walk, 1 or more.
     pub most_visited: usize,
-    /// A triangle not farther from a polygon's centre than this share of the largest distance will
-    /// do as the nearest, 0–1.
-    pub near_enough: f32,
     /// A polygon so many times as large as the region that it would be clipped to is bisected, 1 or
     /// more.
     pub much_larger: f64,
@@ -263,14 +256,11 @@ pub struct MeasureConstants {
 impl Default for MeasureConstants {
     fn default() -> Self {
         Self {
-            points_per_triangle: 2,
-            least_points: 256,
-            most_points: 512,
+            points: 512,
             seeds: 64,
             aside: 0.3,
             most_smaller: 0.9,
             most_visited: 512,
-            near_enough: 0.5,
             much_larger: 16.0,
             polygons_per_triangle: 256,
             divisions: 4096,

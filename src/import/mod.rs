@@ -15,6 +15,8 @@ mod gltf_nodes;
 mod lines;
 mod mtl;
 mod obj;
+mod page_uses;
+mod paged;
 mod paths;
 mod textures;
 mod tokens;

@@ -4,8 +4,9 @@
 //! ([`statements`]); then the chunks are put in their order, which settles what their indices
 //! mean and to which part their faces belong; threads make triangles of them ([`corners`]); and
 //! in order again the triangles go into their parts. Meanwhile the next batch is parsed. The
-//! model does not depend on where chunks end. Memory holds the result, the file's vertices, and
-//! two batches.
+//! model does not depend on where chunks end. Memory holds the file's vertices, which of them each
+//! part has, and two batches; at the end vertices go to their parts, and what the file said of them
+//! goes meanwhile.
 //!
 //! tobj is not used: it keeps about 100 bytes for each face of an object until the object ends and
 //! hashes each corner, makes triangles of polylines, gives faces without texture coordinates those
@@ -27,10 +28,12 @@ use self::corners::{Run, Triangles};
 use self::statements::{Change, Statements, WHITE, first_missing};
 use super::clean::{CleanStats, clean};
 use super::lines::not_text;
-use super::mtl::{Library, MtlMaterial, UvTransform};
+use super::mtl::{Library, MtlMaterial};
+use super::page_uses::PageUses;
+use super::paged::Paged;
 use super::paths::Finder;
 use super::textures::Textures;
-use super::vertices::Unifier;
+use super::vertices::{Numbered, Unifier};
 use crate::cpu_time::CpuTime;
 use crate::mesh::{Group, Model, Part, Warnings};
 use crate::{Error, Result};
@@ -122,14 +125,12 @@ impl Batch {
     }
 }
 
-/// A part in the making.
+/// A part in the making: its indices are numbers of the [`Unifier`]'s vertices, and it has none yet.
 #[derive(Default)]
 struct PartState {
     part: Part,
     /// Faces without texture coordinates.
     bare_faces: u64,
-    /// Whole repeats that texture coordinates are moved back by; `None` before the first.
-    repeats: Option<[f64; 2]>,
 }
 
 /// A material that a `usemtl` named.
@@ -155,10 +156,10 @@ struct Obj<'a> {
     /// What `usemtl` named last; `None` before the first.
     material: Option<u32>,
 
-    positions: Vec<[f64; 3]>,
+    positions: Paged<[f64; 3]>,
     /// Empty until a vertex has a colour, then one per position.
-    colors: Vec<[u16; 4]>,
-    texcoords: Vec<[f64; 2]>,
+    colors: Paged<[u16; 4]>,
+    texcoords: Paged<[f64; 2]>,
 
     groups: Vec<Group>,
     /// What `o` or `g` named last.
@@ -197,9 +198,9 @@ impl<'a> Obj<'a> {
             materials: Vec::new(),
             material_of_name: BTreeMap::new(),
             material: None,
-            positions: Vec::new(),
-            colors: Vec::new(),
-            texcoords: Vec::new(),
+            positions: Paged::default(),
+            colors: Paged::default(),
+            texcoords: Paged::default(),
             groups: Vec::new(),
             group_name: super::stem(path),
             group: None,
@@ -247,13 +248,15 @@ impl<'a> Obj<'a> {
         }
         self.lines += chunk.lines;
         self.stats.add(&chunk.stats);
-        if !(self.colors.is_empty() && chunk.colors.is_empty()) {
-            self.colors.resize(before[0], WHITE);
-            self.colors.append(&mut chunk.colors);
-            self.colors.resize(before[0] + chunk.positions.len(), WHITE);
+        if self.colors.len() > 0 || !chunk.colors.is_empty() {
+            let missing = before[0] - self.colors.len();
+            self.colors.extend(std::iter::repeat_n(WHITE, missing));
+            let missing = chunk.positions.len() - chunk.colors.len();
+            self.colors.extend(std::mem::take(&mut chunk.colors));
+            self.colors.extend(std::iter::repeat_n(WHITE, missing));
         }
-        self.positions.append(&mut chunk.positions);
-        self.texcoords.append(&mut chunk.texcoords);
+        self.positions.extend(std::mem::take(&mut chunk.positions));
+        self.texcoords.extend(std::mem::take(&mut chunk.texcoords));
         let mut runs = Vec::with_capacity(chunk.changes.len() + 1);
         let mut first = 0;
         let face_count = chunk.faces.len();
@@ -291,30 +294,8 @@ impl<'a> Obj<'a> {
             return Err(format!("more than {MOST_VERTICES} distinct vertices; divide the file"));
         }
         self.stats.add(&chunk.stats);
-        let mut vertices = Vec::with_capacity(chunk.vertices.len());
-        for pair in chunk.vertices {
-            let vertex = self.unifier.vertex(pair, || {
-                let PartState { part, repeats, .. } = &mut self.parts[pair.part as usize];
-                let used = &self.materials[part.material as usize];
-                part.positions.push(self.positions[pair.position as usize]);
-                if let Some(color) = self.colors.get(pair.position as usize) {
-                    part.colors.push(*color);
-                }
-                if used.material.material.texture.is_some() || !used.defined {
-                    let given = self.texcoords.get(pair.texcoord as usize);
-                    let texcoord = given.map_or([0.0; 2], |uv| {
-                        let back = repeats.get_or_insert_with(|| match used.defined {
-                            true => used.material.whole_repeats(*uv),
-                            false => [0.0; 2], // it may be clamped for all that is known
-                        });
-                        used.material.transform.apply(*uv, *back)
-                    });
-                    part.texcoords.push(texcoord);
-                }
-                part.positions.len() as u32 - 1
-            });
-            vertices.push(vertex);
-        }
+        let number = |pair| self.unifier.vertex(pair);
+        let vertices: Vec<u32> = chunk.vertices.into_iter().map(number).collect();
         let mut first = 0;
         for (part, end, bare_faces) in chunk.runs {
             let state = &mut self.parts[part as usize];
@@ -389,7 +370,7 @@ impl<'a> Obj<'a> {
         let parts = &mut self.parts;
         let part = *self.part_of.entry((group, material)).or_insert_with(|| {
             let part = Part { group, material, ..Part::default() };
-            parts.push(PartState { part, bare_faces: 0, repeats: None });
+            parts.push(PartState { part, bare_faces: 0 });
             parts.len() as u32 - 1
         });
         self.part = Some(part);
@@ -448,18 +429,48 @@ impl<'a> Obj<'a> {
                     format!("{file}: usemtl without a material library, taken as plain grey");
                 self.warnings.add(what, 1);
             }
-            let used = &self.materials[index as usize].material;
-            let textured = used.material.texture.is_some();
-            for state in self.parts.iter_mut().filter(|state| state.part.material == index) {
-                if !textured {
-                    state.part.texcoords = Vec::new();
-                    state.bare_faces = 0;
-                } else if used.transform != UvTransform::default() {
-                    for texcoord in &mut state.part.texcoords {
-                        let [u, v] = texcoord.map(f64::from);
-                        *texcoord = used.transform.apply([u, 1.0 - v], [0.0; 2]);
-                    }
-                }
+            if self.materials[index as usize].material.material.texture.is_none() {
+                let of_material = |state: &&mut PartState| state.part.material == index;
+                self.parts.iter_mut().filter(of_material).for_each(|state| state.bare_faces = 0);
+            }
+        }
+    }
+
+    /// Gives the parts their vertices. What the file says of these is as large as the parts are, and
+    /// goes as soon as no vertex to come uses it.
+    fn fill_parts(&mut self, mut vertices: Numbered) {
+        let is_white = self.colors.iter().all(|color| *color == WHITE);
+        let mut uses = PageUses::of(vertices.pairs());
+        let counts = vertices.counts.clone();
+        let mut repeats: Vec<Option<[f64; 2]>> = vec![None; self.parts.len()];
+        for vertex in 0..vertices.len() {
+            let Some(pair) = vertices.take(vertex) else { continue };
+            let (number, position) = (pair.part as usize, pair.position as usize);
+            let part = &mut self.parts[number].part;
+            let used = &self.materials[part.material as usize];
+            let count = counts[number] as usize;
+            let at = self.positions.get(position);
+            push(&mut part.positions, count, at.copied().unwrap_or_default());
+            if !is_white {
+                push(&mut part.colors, count, self.colors.get(position).copied().unwrap_or(WHITE));
+            }
+            if used.material.material.texture.is_some() {
+                let given = self.texcoords.get(pair.texcoord as usize);
+                let texcoord = given.map_or([0.0; 2], |uv| {
+                    let back = repeats[number].get_or_insert_with(|| match used.defined {
+                        true => used.material.whole_repeats(*uv),
+                        false => [0.0; 2], // as it was before anything was known of it
+                    });
+                    used.material.transform.apply(*uv, *back)
+                });
+                push(&mut part.texcoords, count, texcoord);
+            }
+            if let Some(page) = uses.last_of_position(pair) {
+                self.positions.free(page);
+                self.colors.free(page);
+            }
+            if let Some(page) = uses.last_of_texcoord(pair) {
+                self.texcoords.free(page);
             }
         }
     }
@@ -480,16 +491,15 @@ impl<'a> Obj<'a> {
         }
         self.resolve_materials();
         self.stats.unused_vertices = self.unifier.unused(self.positions.len());
-        let white = self.colors.iter().all(|color| *color == WHITE);
-        // The arrays by position are as large as the result; they go before anything else comes.
-        self.positions = Vec::new();
-        self.colors = Vec::new();
-        self.texcoords = Vec::new();
-        self.unifier = Unifier::default();
-
+        let vertices = std::mem::take(&mut self.unifier).numbered(self.parts.len());
+        self.parts.par_iter_mut().for_each(|state| {
+            let number = |index: &mut u32| *index = vertices.number(*index);
+            cpu_time.time(|| state.part.indices.iter_mut().for_each(number));
+        });
+        cpu_time.time(|| self.fill_parts(vertices));
         let parts: Vec<(Part, CleanStats)> = std::mem::take(&mut self.parts)
             .into_par_iter()
-            .map(|state| cpu_time.time(|| finished(state, white)))
+            .map(|state| cpu_time.time(|| finished(state)))
             .collect();
         let mut kept = Vec::with_capacity(parts.len());
         for (part, stats) in parts {
@@ -514,16 +524,17 @@ impl<'a> Obj<'a> {
     }
 }
 
-/// A part as it will stay, and what was left out. `white` is true where no vertex has a colour.
-fn finished(PartState { mut part, bare_faces, .. }: PartState, white: bool) -> (Part, CleanStats) {
-    let mut stats = CleanStats { untextured_faces: bare_faces, ..CleanStats::default() };
-    // A part may have begun before the first coloured vertex of the file.
-    if white {
-        part.colors = Vec::new();
-    } else {
-        let missing = part.positions.len() - part.colors.len();
-        part.colors.splice(0..0, std::iter::repeat_n(WHITE, missing));
+/// Pushes one of `count` elements.
+fn push<T>(elements: &mut Vec<T>, count: usize, element: T) {
+    if elements.is_empty() {
+        elements.reserve_exact(count);
     }
+    elements.push(element);
+}
+
+/// A part as it will stay, and what was left out.
+fn finished(PartState { mut part, bare_faces }: PartState) -> (Part, CleanStats) {
+    let mut stats = CleanStats { untextured_faces: bare_faces, ..CleanStats::default() };
     clean(&mut part, &mut stats);
     part.positions.shrink_to_fit();
     part.texcoords.shrink_to_fit();

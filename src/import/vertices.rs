@@ -2,6 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use bytemuck::{Pod, Zeroable};
+
+use super::paged::{Paged, page_of};
+
 /// No index.
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -9,19 +13,20 @@ pub(super) const NONE: u32 = u32::MAX;
 /// no file can make the search quadratic.
 const LONGEST_SEARCH: u32 = 64;
 
-/// The vertices that use one position, as a chain: OBJ indices are dense, so a list per position
-/// takes the place of a hash map.
+/// The vertices, and those that use one position as a chain: OBJ indices are dense, so a list per
+/// position takes the place of a hash map.
 #[derive(Default)]
 pub(super) struct Unifier {
-    /// Per position: its newest entry, or [`NONE`].
+    /// Per position: its newest vertex that is in its chain, or [`NONE`].
     heads: Vec<u32>,
-    entries: Vec<Entry>,
-    /// What was not found within [`LONGEST_SEARCH`] entries of its chain.
+    vertices: Paged<Vertex>,
+    /// What was not found within [`LONGEST_SEARCH`] vertices of its chain.
     beyond: BTreeMap<Pair, u32>,
 }
 
 /// A use of a position in a part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Pair {
     /// The part's number.
     pub(super) part: u32,
@@ -31,10 +36,11 @@ pub(super) struct Pair {
     pub(super) texcoord: u32,
 }
 
-struct Entry {
-    part: u32,
-    texcoord: u32,
-    vertex: u32,
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Vertex {
+    pair: Pair,
+    /// The next older one of its position, or [`NONE`].
     next: u32,
 }
 
@@ -44,38 +50,88 @@ impl Unifier {
         self.heads.resize(positions.max(self.heads.len()), NONE);
     }
 
-    /// The vertex of a pair, whose position there is room for; `make` makes it where it is new.
+    /// The number of a pair's vertex, whose position there is room for: the next one where it is
+    /// new.
     #[inline]
-    pub(super) fn vertex(&mut self, pair: Pair, make: impl FnOnce() -> u32) -> u32 {
+    pub(super) fn vertex(&mut self, pair: Pair) -> u32 {
+        let number = self.vertices.len() as u32;
         let head = self.heads[pair.position as usize];
         let mut at = head;
         let mut searched = 0;
-        while let Some(entry) = self.entries.get(at as usize) {
-            if entry.part == pair.part && entry.texcoord == pair.texcoord {
-                return entry.vertex;
+        while let Some(vertex) = self.vertices.get(at as usize) {
+            if vertex.pair.part == pair.part && vertex.pair.texcoord == pair.texcoord {
+                return at;
             }
-            at = entry.next;
+            at = vertex.next;
             searched += 1;
             if searched == LONGEST_SEARCH {
-                return *self.beyond.entry(pair).or_insert_with(make);
+                let known = *self.beyond.entry(pair).or_insert(number);
+                if known == number {
+                    self.vertices.push(Vertex { pair, next: NONE });
+                }
+                return known;
             }
         }
-        let vertex = make();
-        self.heads[pair.position as usize] = self.entries.len() as u32;
-        let Pair { part, texcoord, .. } = pair;
-        self.entries.push(Entry { part, texcoord, vertex, next: head });
-        vertex
+        self.heads[pair.position as usize] = number;
+        self.vertices.push(Vertex { pair, next: head });
+        number
     }
 
-    /// How many pairs there are in all parts.
+    /// How many vertices there are in all parts.
     pub(super) fn len(&self) -> usize {
-        self.entries.len() + self.beyond.len()
+        self.vertices.len()
     }
 
     /// How many of `positions` positions no vertex uses.
     pub(super) fn unused(&self, positions: usize) -> u64 {
         let beyond = positions.saturating_sub(self.heads.len());
         (self.heads.iter().filter(|head| **head == NONE).count() + beyond) as u64
+    }
+
+    /// The vertices with their numbers within their parts, of which there are so many.
+    pub(super) fn numbered(mut self, parts: usize) -> Numbered {
+        let mut counts = vec![0; parts];
+        for vertex in self.vertices.iter_mut() {
+            let count = &mut counts[vertex.pair.part as usize];
+            vertex.next = *count;
+            *count += 1;
+        }
+        Numbered { vertices: self.vertices, counts }
+    }
+}
+
+/// Vertices with their numbers within their parts.
+pub(super) struct Numbered {
+    /// What was a chain is the number.
+    vertices: Paged<Vertex>,
+    /// How many each part has.
+    pub(super) counts: Vec<u32>,
+}
+
+impl Numbered {
+    /// Within its part, of a vertex.
+    #[inline]
+    pub(super) fn number(&self, vertex: u32) -> u32 {
+        self.vertices.get(vertex as usize).map_or(0, |vertex| vertex.next)
+    }
+
+    /// What the vertices are made of, in order.
+    pub(super) fn pairs(&self) -> impl Iterator<Item = Pair> {
+        self.vertices.iter().map(|vertex| vertex.pair)
+    }
+
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.vertices.len()
+    }
+
+    /// What a vertex is made of; those before it may go.
+    pub(super) fn take(&mut self, vertex: usize) -> Option<Pair> {
+        let page = page_of(vertex);
+        if page > 0 && page_of(vertex - 1) < page {
+            self.vertices.free(page - 1);
+        }
+        self.vertices.get(vertex).map(|vertex| vertex.pair)
     }
 }
 
@@ -85,33 +141,33 @@ mod tests {
 
     #[test]
     fn a_pair_is_one_vertex_to_a_part() {
-        let (mut unifier, mut made) = (Unifier::default(), [0, 0]);
+        let mut unifier = Unifier::default();
         unifier.grow(3);
-        let mut vertex = |part: usize, position, texcoord| {
-            unifier.vertex(Pair { part: part as u32, position, texcoord }, || {
-                made[part] += 1;
-                made[part] - 1
-            })
-        };
+        let mut vertex =
+            |part, position, texcoord| unifier.vertex(Pair { part, position, texcoord });
         assert_eq!([vertex(0, 1, 0), vertex(0, 1, 1), vertex(0, 1, 0)], [0, 1, 0]);
-        assert_eq!([vertex(1, 1, 1), vertex(0, 0, NONE), vertex(0, 1, 1)], [0, 2, 1]);
+        assert_eq!([vertex(1, 1, 1), vertex(0, 0, NONE), vertex(0, 1, 1)], [2, 3, 1]);
         assert_eq!((unifier.unused(3), unifier.len()), (1, 4));
+        let mut numbered = unifier.numbered(2);
+        assert_eq!([0, 1, 2, 3].map(|vertex| numbered.number(vertex)), [0, 1, 0, 2]);
+        assert_eq!(numbered.counts, [3, 1]);
+        let pairs: Vec<Pair> = numbered.pairs().collect();
+        assert_eq!(pairs[2], Pair { part: 1, position: 1, texcoord: 1 });
+        assert_eq!(
+            [0, 1, 2, 3].map(|vertex| numbered.take(vertex)),
+            [0, 1, 2, 3].map(|at| pairs.get(at).copied())
+        );
     }
 
     #[test]
     fn very_long_chains_stay_right() {
         let mut unifier = Unifier::default();
         unifier.grow(1);
-        let mut made = 0;
         for _ in 0..2 {
             for texcoord in 0..1000 {
-                let vertex = unifier.vertex(Pair { part: 0, position: 0, texcoord }, || {
-                    made += 1;
-                    made - 1
-                });
-                assert_eq!(vertex, texcoord);
+                assert_eq!(unifier.vertex(Pair { part: 0, position: 0, texcoord }), texcoord);
             }
         }
-        assert_eq!((made, unifier.len()), (1000, 1000));
+        assert_eq!(unifier.len(), 1000);
     }
 }

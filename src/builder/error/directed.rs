@@ -159,10 +159,10 @@ impl<'a> Directed<'a> {
     }
 
     /// Measures the centre of a part that reaches so far from there, to no less than what settles
-    /// it or what makes a triangle worth clipping to.
+    /// it.
     fn measure_near(&mut self, centre: Vec3, reach: f32) -> (f32, TriangleId) {
         let settling = self.largest.limit() - reach;
-        self.measure(centre, settling.max(self.largest.found * self.constants.near_enough))
+        self.measure(centre, settling)
     }
 
     fn child(&mut self, part: u32, child: u32, bounds: Box3, open: &mut Vec<Open>) {

@@ -6,11 +6,6 @@ use super::bvh::Bvh;
 use super::original::Original;
 use crate::builder::constants::MeasureConstants;
 
-fn points_of(triangles: usize, constants: &MeasureConstants) -> usize {
-    let &MeasureConstants { points_per_triangle, least_points, most_points, .. } = constants;
-    (triangles * points_per_triangle).clamp(least_points, most_points)
-}
-
 /// Points of one mesh, each for as much area as any other, in the order of the leaves of its
 /// tree: neighbours in the list are neighbours in space.
 #[derive(Debug)]
@@ -26,7 +21,7 @@ impl Samples {
             leaves.flat_map(|(leaf, &count)| (0..usize::from(count)).map(|lane| leaf.lane(lane)))
         };
         let area: f64 = lanes().map(|triangle| triangle.area()).sum();
-        let count = points_of(lanes().count(), constants);
+        let count = constants.points;
         let step = area / count as f64;
         let mut points = Vec::with_capacity(count + 1);
         if !(step > 0.0 && step.is_finite()) {
@@ -49,7 +44,7 @@ impl Original {
     /// Points from each part, as many as its area asks for; none where there is no area.
     pub(super) fn samples(&self) -> Vec<Vec3> {
         let area: f64 = self.parts.iter().map(|part| part.samples.area).sum();
-        let count = points_of(self.triangle_count(), &self.constants);
+        let count = self.constants.points;
         let step = area / count as f64;
         if !(step > 0.0 && step.is_finite()) {
             return Vec::new();
@@ -93,7 +88,7 @@ mod tests {
             &[[0, 1, 2], [2, 3, 4], [0, 1, 0]],
         );
         let points = surface_of(&mesh).samples();
-        let count = points_of(3, &MeasureConstants::default());
+        let count = MeasureConstants::default().points;
         assert!(points.len().abs_diff(count) <= 1);
         let of_first = points.iter().filter(|p| p.x / 6.0 + p.y <= 1.0 + 1e-6).count();
         assert!(of_first.abs_diff(count * 6 / 7) <= 1, "{of_first}");

@@ -6,6 +6,7 @@ use std::ops::Range;
 use rustc_hash::FxHashMap;
 
 use super::super::clean::CleanStats;
+use super::super::paged::Paged;
 use super::super::vertices::{NONE, Pair, Unifier};
 use super::statements::Statements;
 use crate::mesh::Triangulator;
@@ -37,7 +38,7 @@ impl Triangles {
         statements: &Statements,
         runs: &[Run],
         before: [usize; 2],
-        positions: &[[f64; 3]],
+        positions: &Paged<[f64; 3]>,
     ) -> Self {
         let mut result =
             Self { indices: Vec::with_capacity(statements.corners.len()), ..Self::default() };
@@ -67,10 +68,10 @@ impl Triangles {
                     let [position, texcoord] = face[corner];
                     let texcoord = if run.textured { texcoord } else { NONE };
                     let pair = Pair { part: run.part, position: places.number(position), texcoord };
-                    let index = unifier.vertex(pair, || {
+                    let index = unifier.vertex(pair);
+                    if index as usize == result.vertices.len() {
                         result.vertices.push(Pair { position, ..pair });
-                        result.vertices.len() as u32 - 1
-                    });
+                    }
                     result.indices.push(index);
                 };
                 if face.len() == 3 {
@@ -78,7 +79,9 @@ impl Triangles {
                     continue;
                 }
                 outline.clear();
-                outline.extend(face.iter().map(|[position, _]| positions[*position as usize]));
+                outline.extend(
+                    face.iter().filter_map(|&[position, _]| positions.get(position as usize)),
+                );
                 if !outline.as_flattened().iter().all(|coordinate| coordinate.is_finite()) {
                     result.stats.not_finite += face.len() as u64 - 2;
                     continue;
