@@ -183,7 +183,7 @@ impl Default for SimplifyConstants {
     }
 }
 
-/// Boxes for small bodies ([`crate::builder::simplify::aggregate`]).
+/// Boxes for small bodies (`crate::builder::simplify::aggregate`).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BoxConstants {
