@@ -171,6 +171,10 @@ pub struct SimplifyConstants {
     /// large as a triangle may have is compared with other ways, 0 or more: it may have worn away
     /// what else would be kept.
     pub doubtful: f64,
+    /// Where parts are large, vertex clustering is among these from this share on.
+    pub doubtful_connected: f64,
+    /// Parts are large that have so many triangles on average.
+    pub scattered_part: usize,
     /// Up to this share of faces that turn or go leaves edge collapse as free as it was, 0–1. A
     /// closed surface that folded flat somewhere on a finer level has two faces in one place there;
     /// both stay, and it stays closed.
@@ -179,7 +183,7 @@ pub struct SimplifyConstants {
 
 impl Default for SimplifyConstants {
     fn default() -> Self {
-        Self { doubtful: 0.1, few_faces: 0.02 }
+        Self { doubtful: 0.1, doubtful_connected: 0.2, scattered_part: 300, few_faces: 0.02 }
     }
 }
 

@@ -8,7 +8,8 @@
 //!    - the same, across material borders too, and leaving out the smallest separate parts; triangles
 //!      then get one material each again ([`crate::builder::simplify::split_mixed`]);
 //!    - the same as the first, of faces that wind one way ([`crate::builder::simplify::orient`]);
-//!    - vertex clustering ([`crate::builder::simplify::cluster`]), which has no topology to respect.
+//!    - vertex clustering ([`crate::builder::simplify::cluster`]), which has no topology to respect;
+//!      where parts are large, only if collapse moves the surface farther.
 //!
 //! Where the mesh is many separate bodies and the budget leaves few triangles to each, boxes for
 //! them (`crate::builder::simplify::aggregate`) are tried against what the ladder gave, by the same measure.
@@ -25,6 +26,7 @@ use crate::builder::simplify::cluster::cluster;
 pub use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::builder::simplify::collapse::collapse;
 use crate::builder::simplify::compact::compact;
+use crate::builder::simplify::connected::Connected;
 use crate::builder::simplify::orient::{has_duplicate_faces, oriented};
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::mesh::{Mesh, UpAxis};
@@ -102,19 +104,23 @@ pub fn simplify(
         }
     }
     let mut candidates = Vec::new();
-    let doubtful = constants.simplify.doubtful * (source.mesh.area() / target as f64).sqrt();
-    if best.mesh.triangles.len() > limit
-        || best.error > doubtful
-        || has_duplicate_faces(&source.mesh, constants.simplify.few_faces)
-    {
-        if tries(LadderStep::Prune) {
+    let share = (source.mesh.area() / target as f64).sqrt();
+    let rules = &constants.simplify;
+    let is_unfit =
+        best.mesh.triangles.len() > limit || has_duplicate_faces(&source.mesh, rules.few_faces);
+    if is_unfit || best.error > rules.doubtful * share {
+        let connected = Connected::of(&source.mesh, &locked);
+        // Over one sheet without seams it does what collapse did.
+        if tries(LadderStep::Prune) && (connected.parts > 1 || connected.has_seams) {
             candidates.push(collapsed(LadderStep::Prune));
         }
-        if tries(LadderStep::Clustering) {
+        let is_scattered = source.mesh.triangles.len() < connected.parts * rules.scattered_part;
+        let is_far = is_unfit || is_scattered || best.error > rules.doubtful_connected * share;
+        if tries(LadderStep::Clustering) && is_far {
             candidates.push(clustered(&source.mesh, &source.border, &locked, target));
         }
         if tries(LadderStep::Oriented) {
-            let few = constants.simplify.few_faces;
+            let few = rules.few_faces;
             candidates.extend(wound(&source, &locked, target, weights, reorientable, few));
         }
     }
@@ -122,7 +128,6 @@ pub fn simplify(
     if candidates.is_empty() {
         return best;
     }
-    let share = (source.mesh.area() / target as f64).sqrt();
     let mut from_source = MeanDistance::from(&source.mesh, constants.measure);
     let mut rank = |candidate: &Simplified, best: (Rank, f64)| {
         let nearest = if best.0 == Rank::Near { best.1 } else { f64::INFINITY };

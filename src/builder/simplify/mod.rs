@@ -4,6 +4,7 @@ mod aggregate;
 pub mod cluster;
 pub mod collapse;
 pub mod compact;
+mod connected;
 pub mod fallback;
 pub mod ladder;
 pub mod merge;
