@@ -10,14 +10,16 @@
 
 use std::error::Error;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use hlod::camera::{Pose, looking_at, up_vector};
-use hlod::format::{NODES_DIR, Scene, TEXTURES_DIR};
+use hlod::format::Scene;
 use hlod::mesh::UpAxis;
-use hlod::render::content::{Content, Picture, held_bytes, picture_bytes};
 use hlod::render::{RenderOptions, Renderer, Shading};
+
+#[path = "support/levels.rs"]
+mod levels;
+use levels::{front, upload};
 
 type Result<T, E = Box<dyn Error>> = std::result::Result<T, E>;
 
@@ -40,7 +42,7 @@ fn main() -> Result<()> {
     println!("adapter: {}", renderer.adapter());
 
     let front = front(&scene, arguments.level);
-    let bytes = upload(&scene, &arguments, &front, &mut renderer)?;
+    let bytes = upload(&scene, &arguments.out, &front, &mut renderer)?;
     let triangles: u64 =
         front.iter().map(|&node| scene.nodes[node as usize].triangles).map(u64::from).sum();
     println!("{} nodes, {triangles} triangles, {bytes} bytes", front.len());
@@ -59,65 +61,6 @@ fn main() -> Result<()> {
     );
     renderer.snapshot()?.save(&arguments.image)?;
     Ok(())
-}
-
-/// The nodes at a level, and leaves above it.
-fn front(scene: &Scene, level: u32) -> Vec<u32> {
-    let nodes = scene.nodes.iter().zip(0..);
-    let drawn = nodes.filter(|(node, _)| {
-        node.level == level || (node.level < level && node.first_child.is_none())
-    });
-    drawn.map(|(_, index)| index).collect()
-}
-
-/// Uploads the front and the shared pictures that it uses; the bytes that they take.
-fn upload(
-    scene: &Scene,
-    arguments: &Arguments,
-    front: &[u32],
-    renderer: &mut Renderer,
-) -> Result<u64> {
-    let shared = |name: &str| {
-        let mut textures = scene.shared_textures.iter().zip(0..);
-        textures.find(|(texture, _)| texture.file_name == name).map(|(_, index)| index)
-    };
-    let mut foretold = 0;
-    let nodes = || front.iter().map(|&index| (index, &scene.nodes[index as usize]));
-    let mut textures: Vec<u32> =
-        nodes().flat_map(|(_, node)| &node.shared_textures).copied().collect();
-    textures.sort();
-    textures.dedup();
-    let (mut decoding, mut uploading) = (Duration::ZERO, Duration::ZERO);
-    for index in textures {
-        let texture = &scene.shared_textures[index as usize];
-        let file = arguments.out.join(TEXTURES_DIR).join(&texture.file_name);
-        let size = [texture.width, texture.height];
-        let begin = Instant::now();
-        let picture = Picture::decode(&file, &std::fs::read(&file)?, size)?;
-        let decoded = Instant::now();
-        renderer.upload_shared(index, &picture)?;
-        decoding += decoded - begin;
-        uploading += decoded.elapsed();
-        foretold += picture_bytes(texture.width, texture.height);
-    }
-    for (index, node) in nodes() {
-        let file = arguments.out.join(NODES_DIR).join(&node.file);
-        let begin = Instant::now();
-        let content = Content::decode(&file, &std::fs::read(&file)?, shared)?;
-        let decoded = Instant::now();
-        renderer.upload(index, node.level, &content)?;
-        decoding += decoded - begin;
-        uploading += decoded.elapsed();
-        foretold += held_bytes(node.vertices, node.triangles, &node.pictures);
-    }
-    let begin = Instant::now();
-    renderer.finish_uploads()?;
-    uploading += begin.elapsed();
-    println!("{decoding:.1?} to read and decode, {uploading:.1?} to upload");
-    if renderer.gpu_bytes() != foretold {
-        return Err(format!("{foretold} bytes foretold, {} taken", renderer.gpu_bytes()).into());
-    }
-    Ok(foretold)
 }
 
 /// The camera, and its near plane.

@@ -89,7 +89,7 @@ def measured(programs, models, changes, runs):
     done = subprocess.run(command, stdout=subprocess.PIPE)
     if done.returncode not in (0, 3):
         raise SystemExit(f"exit code {done.returncode} from {' '.join(command)}")
-    levels = [level for level in json.loads(done.stdout)["levels"] if level["nodes"] > level["leaves"]]
+    levels = [level for level in json.loads(done.stdout)["levels"] if level["nodes"] + level["leaves_above"] > 2 * level["leaves"]]
     shutil.rmtree(out)
     return {
         "seconds": seconds,

@@ -21,8 +21,8 @@ pub struct Accuracy {
     pub reference_pixels: u64,
     /// Of these, pixels with background in that of the frame.
     pub gap_pixels: u64,
-    /// Of these, pixels that are further within the outline of the leaves than the levels drawn
-    /// may be off: background seen through the model.
+    /// Of these, pixels that no outline explains which is off by the tolerance: background seen
+    /// through the model, or in place of something that is gone.
     pub inner_gap_pixels: u64,
     /// Pixels with surface where the leaves have background.
     pub extra_pixels: u64,

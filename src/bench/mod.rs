@@ -30,7 +30,7 @@ pub use model::ModelWorld;
 pub use options::{BenchOptions, Pace, Size};
 pub use record::FrameRecord;
 #[cfg(feature = "render")]
-pub use reference::{Painter, Reference};
+pub use reference::{Painter, Reference, SilhouetteTolerance};
 pub use replay::{Drawn, Look, Replay, Run, World, run};
 pub use report::report_html;
 pub use session::Session;

@@ -38,6 +38,10 @@ struct Arguments {
     /// Texture size of every block in texels, 16 to 16384 on each side
     #[arg(long, value_name = "WxH", value_parser = parse_size, conflicts_with = "no_textures", help_heading = "Textures")]
     texture_size: Option<(u32, u32)>,
+    /// Charts that each block's texture is torn into, shuffled as in the atlases of scans, 1 to
+    /// 100000; 1 leaves it whole
+    #[arg(long, value_name = "N", default_value_t = CityOptions::default().charts, conflicts_with = "no_textures", help_heading = "Textures")]
+    charts: u32,
     /// No textures and no texture coordinates
     #[arg(long, help_heading = "Textures")]
     no_textures: bool,
@@ -101,6 +105,7 @@ impl Arguments {
             blocks: self.blocks,
             triangles: self.triangles,
             texture,
+            charts: self.charts,
             offset: self.offset.0,
             seed: self.seed,
             watertight: self.watertight,

@@ -25,8 +25,8 @@ use crate::mesh::{Model, UpAxis, Warnings};
 use crate::place::placement_of;
 use crate::place::{Globe, z_up};
 use crate::report::build_report::{
-    Baked, BuildReport, Count, FileReport, InputReport, OverBudget, Quantized, StageReport, UpFrom,
-    level_reports,
+    Baked, BuildReport, Count, FileReport, InputReport, OverBudget, Quantized,
+    SharedTexturesReport, StageReport, UpFrom, level_reports,
 };
 use crate::texture::{BakeReason, SharedTextures};
 use crate::{Error, Result, import, tileset};
@@ -232,6 +232,7 @@ impl Run<'_> {
             source_triangles: reports.iter().map(|input| input.triangles).sum(),
             source_texels,
             levels,
+            shared_textures: SharedTexturesReport::of(&scene),
             stages: Stage::ALL
                 .map(|stage| StageReport { stage: stage.name().into(), seconds: seconds(stage) })
                 .to_vec(),

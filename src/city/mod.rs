@@ -25,6 +25,7 @@ mod shell;
 mod staging;
 mod stream;
 mod summary;
+mod tears;
 mod texture;
 mod tiles;
 
@@ -37,6 +38,7 @@ use facade::Facade;
 use layout::BlockPlacement;
 use sampling::Sampling;
 use scan::{STEPS_PER_METRE, Scan};
+use tears::Tears;
 
 pub use block::CityBlock;
 pub use options::{CityOptions, TextureSize};
@@ -144,12 +146,18 @@ impl City {
     /// Draws a block's texture; `None` past the last block or where the city has no textures.
     pub fn texture(&self, index: usize) -> Option<RgbImage> {
         let plan = self.plans.get(index)?;
-        Some(texture::draw(&plan.facade, &self.tiles(index)?, &TileCode::new(index)))
+        let grid = TileGrid::new(plan.texture_size(self.options.texture)?);
+        let whole = texture::draw(&plan.facade, &grid, &TileCode::new(index));
+        Some(match self.tears(plan) {
+            Some(tears) => tears.tear_image(&whole),
+            None => whole,
+        })
     }
 
-    /// The tiles of a block's texture; `None` past the last or where the city has no textures.
+    /// The tiles of a block's texture; `None` past the last or where the city has no textures or
+    /// torn ones.
     pub fn tiles(&self, index: usize) -> Option<TileGrid> {
-        let plan = self.plans.get(index)?;
+        let plan = self.plans.get(index).filter(|_| self.options.charts == 1)?;
         plan.texture_size(self.options.texture).map(TileGrid::new)
     }
 
@@ -174,9 +182,19 @@ impl City {
         Sampling::new(&plan.facade, overhang, self.options.watertight, plan.triangles)
     }
 
+    /// How a block's texture is torn, where it is.
+    fn tears(&self, plan: &Plan) -> Option<Tears> {
+        let charts = Some(self.options.charts).filter(|&charts| charts > 1)?;
+        let whole = plan.texture_size(self.options.texture)?;
+        Some(Tears::new(&self.sampling(plan).grid, whole, charts, plan.seed))
+    }
+
     /// A block's mesh, its steps counted from [`City::origin`].
     fn scan(&self, plan: &Plan) -> Scan {
         let mut scan = scan::scan(&plan.facade, &plan.placement, &self.sampling(plan), plan.seed);
+        if let Some(tears) = self.tears(plan) {
+            tears.tear_scan(&mut scan);
+        }
         let rest = self.world_steps(plan).map(|steps| steps.rem_euclid(STEPS_PER_METRE as i64));
         if rest != [0; 3] {
             for position in &mut scan.positions {

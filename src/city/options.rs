@@ -24,6 +24,9 @@ pub struct CityOptions {
     pub triangles: u64,
     /// Default 17 texels a triangle.
     pub texture: TextureSize,
+    /// Charts that each block's texture is torn into, shuffled as in the atlases of scans; 1, the
+    /// default, leaves it whole. 1–100,000, at most one for each cell of the façade's grid.
+    pub charts: u32,
     /// World position of the city's corner in metres, each component within ±16,000,000 so that
     /// an f32 holds its whole metres; rounded to 0.1 mm. Default 0.
     pub offset: [f64; 3],
@@ -44,6 +47,7 @@ impl Default for CityOptions {
             blocks: 9,
             triangles: 200_000,
             texture: TextureSize::PerTriangle(17.0),
+            charts: 1,
             offset: [0.0; 3],
             seed: 1,
             watertight: false,
@@ -76,6 +80,9 @@ impl CityOptions {
                 "--triangles: {blocks} blocks need {least} to {most}, found {}",
                 self.triangles
             ));
+        }
+        if !(1..=100_000).contains(&self.charts) {
+            return usage(format!("--charts: expected 1 to 100000, found {}", self.charts));
         }
         if let Some(found) = self.offset.iter().find(|x| !(-16e6..=16e6).contains(*x)) {
             return usage(format!(
@@ -117,6 +124,7 @@ mod tests {
         assert!(good.validate().is_ok());
         let bad = [
             (CityOptions { blocks: 0, ..good.clone() }, "--blocks"),
+            (CityOptions { charts: 0, ..good.clone() }, "--charts"),
             (CityOptions { triangles: 17_999, ..good.clone() }, "--triangles"),
             (CityOptions { offset: [0.0, f64::NAN, 0.0], ..good.clone() }, "--offset"),
             (CityOptions { offset: [0.0, 0.0, -2e7], ..good.clone() }, "--offset"),

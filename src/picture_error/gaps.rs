@@ -14,6 +14,8 @@ pub struct Gaps {
     pub extra_pixels: u64,
     /// For each pixel the squared distance to the nearest background of the reference.
     to_background: Vec<u64>,
+    /// For each pixel the squared distance to the nearest surface of the picture.
+    to_surface: Vec<u64>,
 }
 
 /// More than the square of any distance in a picture, where there is no background at all.
@@ -37,32 +39,37 @@ impl Gaps {
             reference_pixels += u64::from(expected.0[0] > 0);
         }
         // Of use for gaps alone.
-        let to_background = if gaps.is_empty() { Vec::new() } else { distances(reference) };
-        Some(Self { width: reference.width(), reference_pixels, gaps, extra_pixels, to_background })
+        let [to_background, to_surface] = match gaps.is_empty() {
+            true => [Vec::new(), Vec::new()],
+            false => [distances(reference, |value| value == 0), distances(picture, |v| v > 0)],
+        };
+        let width = reference.width();
+        Some(Self { width, reference_pixels, gaps, extra_pixels, to_background, to_surface })
     }
 
-    /// Those gaps that are further from the reference's background than `reach` says for them, in
-    /// pixels: no outline that lies a little further in explains them, so that background is seen
-    /// *through* the model.
+    /// Those gaps that no outline explains which lies up to `reach` pixels further in: they are
+    /// farther than that from the reference's background, so that background is seen *through* the
+    /// model, or from the picture's surface, so that something is gone altogether.
     pub fn inner(&self, mut reach: impl FnMut([u32; 2]) -> f64) -> Vec<[u32; 2]> {
         let distance = |[x, y]: [u32; 2]| {
-            (self.to_background[y as usize * self.width as usize + x as usize] as f64).sqrt()
+            let at = y as usize * self.width as usize + x as usize;
+            (self.to_background[at].max(self.to_surface[at]) as f64).sqrt()
         };
         self.gaps.iter().copied().filter(|&at| distance(at) > reach(at)).collect()
     }
 }
 
-/// For each pixel the squared distance to the nearest that is 0: along columns first, and then the
-/// least over each row of what columns have and how far away they are.
-fn distances(picture: &GrayImage) -> Vec<u64> {
+/// For each pixel the squared distance to the nearest that is sought: along columns first, and then
+/// the least over each row of what columns have and how far away they are.
+fn distances(picture: &GrayImage, sought: impl Fn(u8) -> bool) -> Vec<u64> {
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     let mut squares = vec![FAR; width * height];
     for x in 0..width {
-        let background = |y: usize| picture.as_raw()[y * width + x] == 0;
+        let found = |y: usize| sought(picture.as_raw()[y * width + x]);
         let mut nearest = |order: &mut dyn Iterator<Item = usize>| {
             let mut last = None;
             for y in order {
-                if background(y) {
+                if found(y) {
                     last = Some(y);
                 }
                 if let Some(last) = last {
@@ -121,6 +128,15 @@ mod tests {
     }
 
     #[test]
+    fn what_is_gone_altogether_is_no_outline() {
+        // A mast three pixels wide on the ground: every pixel of it is near the background.
+        let reference = mask(21, 30, |x, y| y >= 25 || (9..12).contains(&x));
+        let picture = mask(21, 30, |_, y| y >= 25);
+        let inner = Gaps::between(&reference, &picture).unwrap().inner(|_| 4.0);
+        assert_eq!(inner.len(), 3 * 21, "what is not within four pixels of the ground");
+    }
+
+    #[test]
     fn without_any_background_every_gap_is_inside() {
         let gaps = Gaps::between(&mask(5, 5, |_, _| true), &mask(5, 5, |x, _| x > 0)).unwrap();
         assert_eq!(gaps.inner(|_| 1e6).len(), 5);
@@ -132,7 +148,7 @@ mod tests {
         for share in [0.02, 0.3, 0.9] {
             let bits: Vec<bool> = (0..19 * 23).map(|_| random.between(0.0, 1.0) > share).collect();
             let picture = mask(19, 23, |x, y| bits[(y * 19 + x) as usize]);
-            for (at, found) in distances(&picture).into_iter().enumerate() {
+            for (at, found) in distances(&picture, |value| value == 0).into_iter().enumerate() {
                 let square = |other: usize| {
                     let away = |a: usize, b: usize| a.abs_diff(b) as u64;
                     away(at % 19, other % 19).pow(2) + away(at / 19, other / 19).pow(2)

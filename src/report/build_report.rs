@@ -1,5 +1,9 @@
 //! `build.json`: how a result was made and what it is made of.
 
+use std::fs::File;
+use std::io::ErrorKind;
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::{UpAxis, Warnings};
@@ -22,6 +26,9 @@ pub struct BuildReport {
     pub source_texels: u64,
     /// One entry a level, the roots' first.
     pub levels: Vec<LevelReport>,
+    /// Textures that nodes share, which no level counts.
+    #[serde(default)]
+    pub shared_textures: SharedTexturesReport,
     /// Stages in the order in which they began.
     pub stages: Vec<StageReport>,
     /// Wall time of the whole, in seconds.
@@ -105,6 +112,27 @@ pub enum UpFrom {
 }
 
 impl FileReport {
+    /// Of a file on disk. One that is not there has no bytes: should it appear, that is a change.
+    pub fn read(path: &Path) -> Result<Self> {
+        let failed = |error: std::io::Error| Error::input(path, format!("cannot be read: {error}"));
+        let name = path.to_string_lossy().into_owned();
+        let file = match File::open(path) {
+            Err(error)
+                if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) =>
+            {
+                return Ok(Self { path: name, ..Self::default() });
+            }
+            opened => opened.map_err(failed)?,
+        };
+        let mut hasher = blake3::Hasher::new();
+        hasher.update_reader(file).map_err(failed)?;
+        Ok(Self {
+            path: name,
+            bytes: hasher.count(),
+            blake3: hasher.finalize().to_hex().to_string(),
+        })
+    }
+
     /// Of a file's contents.
     pub fn of(path: &str, bytes: &[u8]) -> Self {
         Self {
@@ -132,6 +160,29 @@ pub struct LevelReport {
     pub bytes: u64,
     /// Nodes that missed their budget.
     pub over_budget: u64,
+}
+
+/// Textures that several nodes refer to, each in a file of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SharedTexturesReport {
+    /// Number of files.
+    pub files: u64,
+    /// Texels of all of them.
+    pub texels: u64,
+    /// Bytes of all of them.
+    pub bytes: u64,
+}
+
+impl SharedTexturesReport {
+    /// Those of a scene.
+    pub fn of(scene: &crate::format::Scene) -> Self {
+        let textures = &scene.shared_textures;
+        Self {
+            files: textures.len() as u64,
+            texels: textures.iter().map(|t| u64::from(t.width) * u64::from(t.height)).sum(),
+            bytes: textures.iter().map(|texture| texture.bytes).sum(),
+        }
+    }
 }
 
 /// How long a stage took.

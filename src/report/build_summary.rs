@@ -14,8 +14,9 @@ const SHOWN_WARNINGS: usize = 8;
 pub fn built(report: &BuildReport, out: &Path) -> String {
     let mut text = String::new();
     let nodes: u64 = report.levels.iter().map(|level| level.nodes).sum();
-    let bytes: u64 = report.levels.iter().map(|level| level.bytes).sum();
-    let texels: u64 = report.levels.iter().map(|level| level.texels).sum();
+    let shared = report.shared_textures;
+    let bytes = report.levels.iter().map(|level| level.bytes).sum::<u64>() + shared.bytes;
+    let texels = report.levels.iter().map(|level| level.texels).sum::<u64>() + shared.texels;
     let rate = report.source_triangles as f64 / report.seconds.max(1e-9);
     // Writing to a string cannot fail, hence `let _`.
     let _ = writeln!(
@@ -38,10 +39,19 @@ pub fn built(report: &BuildReport, out: &Path) -> String {
             level.bytes as f64 / 1e6
         );
     }
+    if shared.files > 0 {
+        let _ = writeln!(
+            text,
+            "  {:<26} {:>9.2} {:>8.1}",
+            format!("{} shared textures", shared.files),
+            shared.texels as f64 / 1e6,
+            shared.bytes as f64 / 1e6
+        );
+    }
     if report.source_texels > 0 {
         let _ = writeln!(
             text,
-            "  texels in nodes: {:.2} times those that the source uses",
+            "  texels: {:.2} times those that the source uses",
             texels as f64 / report.source_texels as f64
         );
     }

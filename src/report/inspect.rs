@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
-use super::build_report::level_reports;
+use super::build_report::{SharedTexturesReport, level_reports};
 use super::decimal::shortest;
 use crate::format::{Node, SCENE_VERSION, Scene};
 
@@ -95,14 +95,9 @@ fn facts(out: &mut String, scene: &Scene) {
     let levels = level_reports(scene);
     let leaves = scene.nodes.iter().filter(|node| node.first_child.is_none());
     let leaf_triangles: u64 = leaves.map(|node| u64::from(node.triangles)).sum();
-    let bytes: u64 = levels.iter().map(|level| level.bytes).sum::<u64>()
-        + scene.shared_textures.iter().map(|texture| texture.bytes).sum::<u64>();
-    let texels: u64 = levels.iter().map(|level| level.texels).sum::<u64>()
-        + scene
-            .shared_textures
-            .iter()
-            .map(|texture| u64::from(texture.width) * u64::from(texture.height))
-            .sum::<u64>();
+    let shared = SharedTexturesReport::of(scene);
+    let bytes = levels.iter().map(|level| level.bytes).sum::<u64>() + shared.bytes;
+    let texels = levels.iter().map(|level| level.texels).sum::<u64>() + shared.texels;
     let [min, max] = scene.bounds().unwrap_or_default();
     let [x, y, z] = std::array::from_fn(|axis| max[axis] - min[axis]);
     push(
@@ -135,7 +130,9 @@ fn facts(out: &mut String, scene: &Scene) {
         ),
     );
     if !scene.shared_textures.is_empty() {
-        push(out, format_args!("{} shared textures", scene.shared_textures.len()));
+        let SharedTexturesReport { files, texels, bytes } = shared;
+        let (texels, bytes) = (quantity(texels), size(bytes));
+        push(out, format_args!("of this {files} shared textures, {texels} texels, {bytes}"));
     }
     push(out, format_args!("fingerprint {}", hexadecimal(&scene.fingerprint[..8])));
     push(out, format_args!("parameters {}\n", scene.parameters));

@@ -12,13 +12,18 @@ use super::tree::line;
 use crate::format::Scene;
 use crate::lattice::Quantization;
 
+/// What to try where errors were measured against something else than was built.
+const OTHER_SOURCE: &str = "name the files that the scene was built from, or build it again";
+
 /// Compares stored and measured errors of all coarse nodes. What leaves may be off by rounding is
-/// room for both, and the least that is counted as measured; `steps` are the lattice's.
+/// room for both, and the least that is counted as measured; `steps` are the lattice's. `same_source` says that the scene was built from
+/// what it is compared with, as far as is known.
 pub(super) fn errors(
     scene: &Scene,
     nodes: &[NodeError],
     steps: &[f64],
     limits: &Limits,
+    same_source: bool,
 ) -> (Vec<ErrorFigures>, Check) {
     let mut check = Check::new("stored errors");
     let mut ratios: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
@@ -65,7 +70,12 @@ pub(super) fn errors(
         check.fail(
             file,
             what,
-            "use the measured figure, and report this: the builder's bound does not hold",
+            match same_source {
+                true => {
+                    "use the measured figure, and report this: the builder's bound does not hold"
+                }
+                false => OTHER_SOURCE,
+            },
         );
     }
     let mut figures = Vec::with_capacity(ratios.len());

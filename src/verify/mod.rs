@@ -1,5 +1,5 @@
 //! Verifying a built scene: that it is whole, that its leaves are the source, how far each level is
-//! from it, that nothing shows between levels, and how levels appearance.
+//! from it, that nothing shows between levels, and what levels look like.
 //!
 //! | file | what it checks |
 //! |---|---|
@@ -32,6 +32,7 @@ mod lines;
 mod node_errors;
 mod node_textures;
 mod options;
+mod other_sources;
 mod points;
 mod progress;
 mod report;
@@ -86,6 +87,7 @@ pub fn verify(
         version: env!("CARGO_PKG_VERSION").into(),
         out: out.to_string_lossy().into_owned(),
         source: Vec::new(),
+        other_sources: Vec::new(),
         options: options.clone(),
         passed: false,
         scene: None,
@@ -136,6 +138,7 @@ impl Verification<'_> {
             }
         };
         report.source = source.as_ref().map(Source::names).unwrap_or_default();
+        report.other_sources = other_sources::other_sources(out, sources)?;
         let (mut geometry, check) = structure::structure(out, scene, &options.limits, progress);
         report.checks.push(check);
         if geometry.iter().any(|node| node.triangles.is_empty()) {
@@ -254,7 +257,7 @@ impl Verification<'_> {
         };
         let diagonal = report.scene.as_ref().map_or(0.0, |facts| facts.diagonal);
         let mut all: Vec<NodeDistances> = Vec::new();
-        let measure = |front: &Front, level: u32| {
+        let measure = |front: &Front, level: Option<u32>| {
             let seed = options.seed;
             let distances =
                 distance::measure(scene, front, leaves, geometry, points, surface, seed, progress);
@@ -273,7 +276,7 @@ impl Verification<'_> {
         };
         for level in 0..tree::coarse_levels(scene) {
             progress.phase(&format!("level {level}"), leaves.len() as u64);
-            let (figures, nodes) = measure(&Front::level(scene, level), level);
+            let (figures, nodes) = measure(&Front::level(scene, level), Some(level));
             report.levels.push(figures);
             all.extend(nodes);
         }
@@ -281,12 +284,12 @@ impl Verification<'_> {
             let triangles = report.scene.as_ref().map_or(0, |facts| facts.leaf_triangles);
             let front = Front::of_size(scene, (triangles as f64 * share) as u64);
             progress.phase("a front of mixed levels", leaves.len() as u64);
-            let deepest = front.nodes().map(|node| scene.nodes[node as usize].level).max();
-            report.front = Some(measure(&front, deepest.unwrap_or(0)).0);
+            report.front = Some(measure(&front, None).0);
         }
         progress.phase("errors of the nodes", all.len() as u64);
         let errors = node_errors::node_errors(scene, leaves, geometry, progress);
-        let (figures, check) = errors::errors(scene, &errors, steps, &options.limits);
+        let (figures, check) =
+            errors::errors(scene, &errors, steps, &options.limits, report.other_sources.is_empty());
         report.errors = figures;
         report.checks.push(check);
         // Both hold every coarse node once.
@@ -301,16 +304,16 @@ impl Verification<'_> {
     fn level_figures(
         &self,
         front: &Front,
-        level: u32,
+        level: Option<u32>,
         geometry: &[NodeGeometry],
         distances: &FrontDistances,
         diagonal: f64,
     ) -> LevelFigures {
         let to_front = distance::figures(&distances.to_front, diagonal);
         let to_source = distance::figures(&distances.to_source, diagonal);
+        let deepest = || front.nodes().map(|node| self.scene.nodes[node as usize].level).max();
         let mut figures = LevelFigures {
-            level,
-            nodes: distances.nodes.len() as u64,
+            level: level.or_else(deepest).unwrap_or(0),
             two_sided: distance::larger(&to_front, &to_source),
             to_front,
             to_source,
@@ -318,7 +321,12 @@ impl Verification<'_> {
         };
         for node in front.nodes() {
             let geometry = &geometry[node as usize];
-            figures.leaves += u64::from(tree::is_leaf(self.scene, node));
+            let is_leaf = tree::is_leaf(self.scene, node);
+            let above =
+                is_leaf && level.is_some_and(|level| self.scene.nodes[node as usize].level < level);
+            figures.leaves += u64::from(is_leaf);
+            figures.leaves_above += u64::from(above);
+            figures.nodes += u64::from(!above);
             figures.triangles += geometry.triangles.len() as u64;
             figures.cut_plane_triangles +=
                 geometry.in_cut_plane.iter().filter(|&&inside| inside).count() as u64;

@@ -18,6 +18,8 @@ pub struct VerifyReport {
     pub out: String,
     /// The model files that it was compared with; empty where leaves stand for the source.
     pub source: Vec<String>,
+    /// Those of them whose contents are not what `build.json` says that the scene was built from.
+    pub other_sources: Vec<String>,
     /// How it was verified.
     pub options: VerifyOptions,
     /// True where every check passed.
@@ -154,9 +156,11 @@ pub struct LeafFigures {
 pub struct LevelFigures {
     /// Steps from the root.
     pub level: u32,
-    /// Its nodes that are no leaves.
+    /// Nodes of the level; of a front of mixed levels all of its nodes.
     pub nodes: u64,
-    /// Its leaves.
+    /// Leaves above the level, which are in its front, too.
+    pub leaves_above: u64,
+    /// All leaves of the front.
     pub leaves: u64,
     /// Triangles of the front.
     pub triangles: u64,

@@ -28,12 +28,16 @@ pub fn text(report: &VerifyReport) -> String {
         [one] => line(format!("Against {one}")),
         [first, others @ ..] => line(format!("Against {first} and {} more", others.len())),
     }
+    for other in &report.other_sources {
+        line(format!("{other} is not the file that the scene was built from (build.json)"));
+    }
     if !report.levels.is_empty() {
         line(format!(
-            "\nDistance of each level to the source, two-sided, in metres and in 1e-4 of the diagonal; colour RMS of 255\n\
-             {:>5} {:>7} {:>10} {:>9} {:>7} {:>9} {:>7} {:>9} {:>7} {:>7} {:>12}",
+            "\nDistance of each level, with the leaves above it, to the source, two-sided, in metres and in 1e-4 of the diagonal; colour RMS of 255\n\
+             {:>5} {:>7} {:>7} {:>10} {:>9} {:>7} {:>9} {:>7} {:>9} {:>7} {:>7} {:>12}",
             "level",
             "nodes",
+            "leaves",
             "triangles",
             "mean m",
             "e-4",
@@ -57,9 +61,10 @@ pub fn text(report: &VerifyReport) -> String {
                 _ => "too coarse".into(),
             });
             line(format!(
-                "{:>5} {:>7} {:>10} {:>9.4} {:>7.3} {:>9.4} {:>7.3} {:>9.4} {:>7.2} {:>7} {:>12}",
+                "{:>5} {:>7} {:>7} {:>10} {:>9.4} {:>7.3} {:>9.4} {:>7.3} {:>9.4} {:>7.2} {:>7} {:>12}",
                 name,
                 level.nodes,
+                level.leaves_above,
                 level.triangles,
                 mean,
                 mean_relative,

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use glam::DVec3;
-use hlod::bench::{Accuracy, Reference, Session, Sighting, Witness};
+use hlod::bench::{Accuracy, Reference, Session, Sighting, SilhouetteTolerance, Witness};
 use hlod::camera::{Ground, PathKind, Pose, View, from_angles, make_path};
 use hlod::city::{CityOptions, TextureSize};
 use hlod::mesh::UpAxis;
@@ -37,7 +37,7 @@ fn closed_city(folder: &Path) -> Session {
 /// `None` where there is no adapter and none is required.
 fn reference(session: &Session) -> Option<Reference> {
     let options = RenderOptions { size: SIZE, ..RenderOptions::default() };
-    or_skip(Reference::new(session, &options, 1))
+    or_skip(Reference::new(session, &options, 1, SilhouetteTolerance::default()))
 }
 
 /// From streets and from above, near and far.

@@ -12,6 +12,7 @@ use hlod::builder::simplify::ladder::Simplifier;
 use hlod::city::{City, CityOptions, TextureSize, TileCode};
 use hlod::format::{NodeImageData, NodeMesh, file_crc};
 use hlod::mesh::Wrap;
+use hlod::report::BuildReport;
 use image::RgbImage;
 use tempfile::TempDir;
 
@@ -201,6 +202,15 @@ fn the_files_are_those_of_the_scene_and_no_others() {
             let bytes = &found[&format!("textures/{}", texture.file_name)];
             assert_eq!(texture.bytes, bytes.len() as u64);
         }
+        let report: BuildReport = serde_json::from_slice(&found["build.json"]).unwrap();
+        let in_folder = |folder: &str| -> u64 {
+            let files = found.iter().filter(|(name, _)| name.starts_with(folder));
+            files.map(|(_, bytes)| bytes.len() as u64).sum()
+        };
+        let of_levels: u64 = report.levels.iter().map(|level| level.bytes).sum();
+        assert_eq!(of_levels, in_folder("nodes/"), "{}", case.name);
+        assert_eq!(report.shared_textures.bytes, in_folder("textures/"), "{}", case.name);
+        assert_eq!(report.shared_textures.files, scene.shared_textures.len() as u64);
         assert_eq!(scene.check(), []);
     }
 }

@@ -257,3 +257,32 @@ fn the_command_prints_a_table_or_json_and_ends_in_a_code() {
     arguments(&["--samples", "10"]).assert().code(2).stderr(contains("samples"));
     arguments(&["--source", "nowhere.obj"]).assert().code(3).stderr(contains("nowhere.obj"));
 }
+
+#[test]
+fn a_level_counts_the_nodes_that_inspect_counts_and_the_leaves_above_it_apart() {
+    let report = report(&SOUND.folder.path().join("skirts"), false);
+    let scene = Scene::read(&SOUND.folder.path().join("skirts")).unwrap();
+    assert!(report.levels.len() >= 2);
+    for level in &report.levels {
+        let on_level = scene.nodes.iter().filter(|node| node.level == level.level).count() as u64;
+        let is_above =
+            |node: &&hlod::format::Node| node.level < level.level && node.first_child.is_none();
+        let above = scene.nodes.iter().filter(is_above).count() as u64;
+        assert_eq!((level.nodes, level.leaves_above), (on_level, above), "{}", level.level);
+    }
+}
+
+#[test]
+fn another_source_than_was_built_is_named_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    let other =
+        write_city(folder.path(), &CityOptions { triangles: 12_000, seed: 77, ..small_city() });
+    let out = SOUND.folder.path().join("skirts");
+    let found = verify(&out, std::slice::from_ref(&other), &options(), &Silent).unwrap();
+    assert!(!found.passed);
+    assert_eq!(found.other_sources, [other.to_string_lossy().into_owned()]);
+    let text = hlod::verify::text(&found);
+    assert!(text.contains("is not the file that the scene was built from"), "{text}");
+    assert!(!text.contains("the builder's bound does not hold"), "{text}");
+    assert!(report(&out, true).other_sources.is_empty());
+}

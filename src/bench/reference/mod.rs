@@ -14,6 +14,7 @@ use crate::runtime::{SceneTree, front_before};
 use crate::{Error, Result};
 pub use painter::Painter;
 use reach::Reach;
+pub use reach::SilhouetteTolerance;
 
 /// Bytes that a reference holds, beside those of the run.
 const CAP_BYTES: u64 = 512 << 20;
@@ -27,18 +28,24 @@ pub struct Reference {
     painter: Painter,
     leaves: Vec<u32>,
     every: u64,
+    tolerance: SilhouetteTolerance,
     worst: Vec<WorstFrame>,
 }
 
 impl Reference {
     /// Every `every` frames, at least 1, beginning with the first. `options` are those of the
     /// run.
-    pub fn new(session: &Session, options: &RenderOptions, every: u64) -> Result<Self> {
+    pub fn new(
+        session: &Session,
+        options: &RenderOptions,
+        every: u64,
+        tolerance: SilhouetteTolerance,
+    ) -> Result<Self> {
         let tree = session.tree();
         let leaves =
             (0..tree.len() as u32).filter(|&node| tree.children(node).is_empty()).collect();
         let painter = Painter::new(session, options, CAP_BYTES)?;
-        Ok(Self { painter, leaves, every: every.max(1), worst: Vec::new() })
+        Ok(Self { painter, leaves, every: every.max(1), tolerance, worst: Vec::new() })
     }
 
     /// What a summary and a report say of it.
@@ -94,7 +101,7 @@ impl Witness for Reference {
             Vec::new()
         } else {
             let depths = self.painter.depths()?;
-            let reach = Reach::new(self.painter.tree(), front, view);
+            let reach = Reach::new(self.painter.tree(), front, view, self.tolerance);
             let width = view.size[0] as usize;
             gaps.inner(|[x, y]| {
                 reach.at([x, y], f64::from(depths[y as usize * width + x as usize]))

@@ -5,11 +5,24 @@ use glam::DVec3;
 use crate::camera::View;
 use crate::runtime::SceneTree;
 
-/// Pixels by which an outline may be off through rasterisation alone.
-const RASTER: f64 = 2.0;
+/// How many pixels an outline may be off without being taken for a gap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SilhouetteTolerance {
+    /// Pixels whatever is drawn, 0 or more; default 2, since rasterisation alone may differ so.
+    pub pixels: f64,
+    /// Most pixels that the errors of the nodes drawn there add, 0 or more; default 8.
+    pub most_error_pixels: f64,
+}
+
+impl Default for SilhouetteTolerance {
+    fn default() -> Self {
+        Self { pixels: 2.0, most_error_pixels: 8.0 }
+    }
+}
 
 /// For pixels of one view, how many pixels the levels drawn there may be off.
 pub(super) struct Reach {
+    tolerance: SilhouetteTolerance,
     view: View,
     /// Boxes of the nodes drawn, each as much larger as its node may be off, and by how much.
     boxes: Vec<([DVec3; 2], f64)>,
@@ -18,7 +31,12 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    pub fn new(tree: &SceneTree, front: &[u32], view: &View) -> Self {
+    pub fn new(
+        tree: &SceneTree,
+        front: &[u32],
+        view: &View,
+        tolerance: SilhouetteTolerance,
+    ) -> Self {
         let boxes = front.iter().map(|&node| {
             let node = tree.node(node);
             let [low, high] = node.bbox;
@@ -26,12 +44,12 @@ impl Reach {
         });
         let pixel = 1.0 / view.pixels_per_metre();
         let steps = [view.pose.right() * pixel, -view.pose.up() * pixel];
-        Self { view: *view, boxes: boxes.collect(), steps }
+        Self { tolerance, view: *view, boxes: boxes.collect(), steps }
     }
 
     /// Pixels from the outline within which a gap at a pixel is explained: the most that any node
-    /// there may be off, as large as it is seen. Nodes that end before what the leaves show there,
-    /// `depth` metres along the view, do not count.
+    /// there may be off, as large as it is seen, but no more than the tolerance says. Nodes that end
+    /// before what the leaves show there, `depth` metres along the view, do not count.
     pub fn at(&self, [x, y]: [u32; 2], depth: f64) -> f64 {
         let [width, height] = self.view.size.map(f64::from);
         let [across, down] = [f64::from(x) + 0.5 - width / 2.0, f64::from(y) + 0.5 - height / 2.0];
@@ -51,7 +69,8 @@ impl Reach {
             let nearest = enter.max(depth - error * slant);
             Some(error * slant / nearest.max(f64::MIN_POSITIVE))
         });
-        RASTER + off.fold(0.0, f64::max) * self.view.pixels_per_metre()
+        let off = off.fold(0.0, f64::max) * self.view.pixels_per_metre();
+        self.tolerance.pixels + off.min(self.tolerance.most_error_pixels)
     }
 }
 
@@ -77,15 +96,18 @@ mod tests {
         let tree = SceneTree::new(&cubes());
         let pose = Pose { position: DVec3::ZERO, rotation: DQuat::IDENTITY, fov_y_deg: 90.0 };
         let view = View::new(pose, DVec3::ZERO, [400, 200]);
-        let reach = Reach::new(&tree, &[0, 1, 2], &view);
+        let tolerance = SilhouetteTolerance { most_error_pixels: 1.12, ..Default::default() };
+        let reach = Reach::new(&tree, &[0, 1, 2], &view, tolerance);
         // 100 pixels a metre at one metre; the near cube's front is at 9 m less what it is off.
-        let near = reach.at([200, 100], 9.0) - RASTER;
+        let uncapped = Reach::new(&tree, &[0, 1, 2], &view, SilhouetteTolerance::default());
+        let near = uncapped.at([200, 100], 9.0) - 2.0;
         assert!((near - 10.0 / 8.9).abs() < 0.01, "{near}");
+        assert_eq!(reach.at([200, 100], 9.0), 2.0 + 1.12);
         // Behind it only the far one counts.
-        let far = reach.at([200, 100], 99.0) - RASTER;
+        let far = reach.at([200, 100], 99.0) - 2.0;
         assert!((far - 10.0 / 98.9).abs() < 0.001, "{far}");
         // Where there is none, nothing is off.
-        assert_eq!(reach.at([200, 10], 9.0), RASTER);
-        assert_eq!(reach.at([10, 100], 9.0), RASTER);
+        assert_eq!(reach.at([200, 10], 9.0), 2.0);
+        assert_eq!(reach.at([10, 100], 9.0), 2.0);
     }
 }

@@ -257,7 +257,7 @@ struct Job<'a> {
 #[cfg(feature = "render")]
 fn run(job: Job) -> Result<(Run, Context)> {
     let Job { arguments, session, path, options, constants, bar } = job;
-    use hlod::bench::{Reference, Snapshots, Witness};
+    use hlod::bench::{Reference, SilhouetteTolerance, Snapshots, Witness};
     use hlod::render::{RenderOptions, Renderer, Shading};
     use run_args::ShadingArg;
     let render = RenderOptions {
@@ -272,7 +272,11 @@ fn run(job: Job) -> Result<(Run, Context)> {
         cull: arguments.cull,
         ..RenderOptions::default()
     };
-    let reference = |every| Reference::new(session, &render, every);
+    let tolerance = SilhouetteTolerance {
+        pixels: arguments.gap_tolerance,
+        most_error_pixels: arguments.gap_error,
+    };
+    let reference = |every| Reference::new(session, &render, every, tolerance);
     let mut reference = arguments.reference_every.map(reference).transpose()?;
     let witness = reference.as_mut().map(|reference| reference as &mut dyn Witness);
     let progress = |frame: &FrameRecord| bar.frame(frame);

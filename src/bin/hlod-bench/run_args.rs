@@ -116,6 +116,12 @@ pub struct RunArgs {
     /// FLIP, PSNR, SSIM, gaps, and the pop where levels toggled. N 1 or more
     #[arg(long, value_name = "N", conflicts_with = "show_levels", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Drawing")]
     pub reference_every: Option<u64>,
+    /// Pixels that an outline may be off before background inside of it counts as a gap, 0 or more
+    #[arg(long, value_name = "PIXELS", default_value_t = 2.0, value_parser = parse_not_negative, help_heading = "Drawing")]
+    pub gap_tolerance: f64,
+    /// Most pixels that the geometric errors of the nodes drawn there add to it, 0 or more
+    #[arg(long, value_name = "PIXELS", default_value_t = 8.0, value_parser = parse_not_negative, help_heading = "Drawing")]
+    pub gap_error: f64,
     /// Tint nodes by level
     #[arg(long, help_heading = "Drawing")]
     pub show_levels: bool,
@@ -154,6 +160,13 @@ fn parse_bytes(text: &str) -> Result<u64, String> {
         Ok(bytes as u64)
     } else {
         Err(wanted.to_owned())
+    }
+}
+
+fn parse_not_negative(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number >= 0.0 => Ok(number),
+        _ => Err("expected a number of 0 or more".into()),
     }
 }
 

@@ -1,0 +1,129 @@
+//! FLIP of the coarse levels of a built scene against its leaves, from twelve fixed views around it.
+//!
+//! usage: level_views OUT [--levels N] [--near PIXELS] [--far PIXELS] [--pictures FOLDER]
+//!        [--adapter NAME]
+//!
+//! Views are from every 45 degrees around at 30 degrees over the horizon and every 90 at 60. The
+//! scene's diagonal is 800 pixels long in the near views, 300 in the far ones. One JSON object:
+//! by level its triangles and the mean FLIP of the near and of the far views, over the pixels that
+//! either picture has something in. Level N is the last (default 1).
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use glam::DVec3;
+use hlod::camera::{Pose, from_angles};
+use hlod::format::Scene;
+use hlod::picture_error::{PIXELS_PER_DEGREE, flip};
+use hlod::render::{RenderOptions, Renderer};
+use image::{Rgb, RgbImage, RgbaImage};
+
+#[path = "support/levels.rs"]
+mod levels;
+use levels::{front, upload};
+
+type Result<T, E = Box<dyn Error>> = std::result::Result<T, E>;
+
+const FOV_Y_DEG: f64 = 30.0;
+
+struct Arguments {
+    out: PathBuf,
+    levels: u32,
+    sizes: [u32; 2],
+    pictures: Option<PathBuf>,
+    adapter: Option<String>,
+}
+
+fn main() -> Result<()> {
+    let arguments = parse()?;
+    let scene = Scene::read(&arguments.out)?;
+    let mut found = Vec::new();
+    let leaves = arguments.sizes.map(|size| views(&scene, &arguments, size, u32::MAX));
+    let [near, far] = leaves;
+    let leaves = [near?, far?];
+    for level in 0..=arguments.levels.min(scene.level_count() as u32 - 1) {
+        let triangles: u64 = front(&scene, level)
+            .iter()
+            .map(|&node| u64::from(scene.nodes[node as usize].triangles))
+            .sum();
+        let mut means = [0.0; 2];
+        for (kind, size) in arguments.sizes.into_iter().enumerate() {
+            let pictures = views(&scene, &arguments, size, level)?;
+            let errors = leaves[kind].iter().zip(&pictures).map(|(a, b)| difference(a, b));
+            let errors: Vec<f64> = errors.collect::<Result<_>>()?;
+            means[kind] = errors.iter().sum::<f64>() / errors.len() as f64;
+            if let Some(folder) = &arguments.pictures {
+                std::fs::create_dir_all(folder)?;
+                let name = format!("level{level}-{size}.png");
+                pictures[0].save(folder.join(name))?;
+                leaves[kind][0].save(folder.join(format!("leaves-{size}.png")))?;
+            }
+        }
+        found.push(serde_json::json!({
+            "level": level, "triangles": triangles, "near": means[0], "far": means[1],
+        }));
+    }
+    println!("{}", serde_json::json!({ "levels": found }));
+    Ok(())
+}
+
+/// The pictures of a level from all views.
+fn views(scene: &Scene, arguments: &Arguments, size: u32, level: u32) -> Result<Vec<RgbaImage>> {
+    let options = RenderOptions {
+        size: [size * 5 / 4, size * 5 / 4],
+        adapter: arguments.adapter.clone(),
+        ..RenderOptions::default()
+    };
+    let mut renderer = Renderer::new(&options)?;
+    let nodes = front(scene, level);
+    upload(scene, &arguments.out, &nodes, &mut renderer)?;
+    let bounds = scene.bounds().ok_or("the scene has no nodes")?.map(DVec3::from);
+    let (middle, diagonal) = ((bounds[0] + bounds[1]) / 2.0, (bounds[1] - bounds[0]).length());
+    // Four fifths of the picture are as high as the diagonal, seen across its middle.
+    let away = diagonal * 1.25 / 2.0 / (FOV_Y_DEG.to_radians() / 2.0).tan();
+    let around = (0..8).map(|step| (f64::from(step) * 45.0, -30.0));
+    let above = (0..4).map(|step| (f64::from(step) * 90.0 + 20.0, -60.0));
+    let mut pictures = Vec::new();
+    for (yaw, pitch) in around.chain(above) {
+        let rotation = from_angles(scene.up, yaw, pitch, 0.0);
+        let position = middle - rotation * DVec3::NEG_Z * away;
+        let pose = Pose { position, rotation, fov_y_deg: FOV_Y_DEG };
+        renderer.draw(&nodes, &pose, (away * 1e-3) as f32)?;
+        pictures.push(renderer.snapshot()?);
+    }
+    Ok(pictures)
+}
+
+/// FLIP over the pixels in which either picture has a surface.
+fn difference(leaves: &RgbaImage, level: &RgbaImage) -> Result<f64> {
+    let opaque = |picture: &RgbaImage| {
+        RgbImage::from_fn(picture.width(), picture.height(), |x, y| {
+            let [r, g, b, _] = picture.get_pixel(x, y).0;
+            Rgb([r, g, b])
+        })
+    };
+    let map = flip(&opaque(leaves), &opaque(level), PIXELS_PER_DEGREE).ok_or("sizes differ")?;
+    let shown = leaves.pixels().zip(level.pixels()).filter(|(a, b)| a.0[3] > 0 || b.0[3] > 0);
+    let all = f64::from(leaves.width()) * f64::from(leaves.height());
+    Ok(map.mean() * all / shown.count().max(1) as f64)
+}
+
+fn parse() -> Result<Arguments> {
+    let (mut levels, mut sizes, mut pictures, mut adapter) = (1, [800, 300], None, None);
+    let mut places = Vec::new();
+    let mut words = std::env::args().skip(1);
+    while let Some(word) = words.next() {
+        let mut value = || words.next().ok_or(format!("{word} needs a value"));
+        match word.as_str() {
+            "--levels" => levels = value()?.parse()?,
+            "--near" => sizes[0] = value()?.parse()?,
+            "--far" => sizes[1] = value()?.parse()?,
+            "--pictures" => pictures = Some(value()?.into()),
+            "--adapter" => adapter = Some(value()?),
+            _ if word.starts_with("--") => return Err(format!("no such option: {word}").into()),
+            _ => places.push(PathBuf::from(word)),
+        }
+    }
+    let [out] = <[PathBuf; 1]>::try_from(places).map_err(|_| "usage: level_views OUT [options]")?;
+    Ok(Arguments { out, levels, sizes, pictures, adapter })
+}
