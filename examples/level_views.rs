@@ -4,7 +4,8 @@
 //!        [--adapter NAME]
 //!
 //! Views are from every 45 degrees around at 30 degrees over the horizon and every 90 at 60. The
-//! scene's diagonal is 800 pixels long in the near views, 300 in the far ones. One JSON object:
+//! scene's box is at most 800 pixels wide and high in the near views, 300 in the far ones. One JSON
+//! object:
 //! by level its triangles and the mean FLIP of the near and of the far views, over the pixels that
 //! either picture has something in. Level N is the last (default 1).
 
@@ -78,18 +79,28 @@ fn views(scene: &Scene, arguments: &Arguments, size: u32, level: u32) -> Result<
     let nodes = front(scene, level);
     upload(scene, &arguments.out, &nodes, &mut renderer)?;
     let bounds = scene.bounds().ok_or("the scene has no nodes")?.map(DVec3::from);
-    let (middle, diagonal) = ((bounds[0] + bounds[1]) / 2.0, (bounds[1] - bounds[0]).length());
-    // Four fifths of the picture are as high as the diagonal, seen across its middle.
-    let away = diagonal * 1.25 / 2.0 / (FOV_Y_DEG.to_radians() / 2.0).tan();
+    let middle = (bounds[0] + bounds[1]) / 2.0;
+    // Four fifths of the picture hold all corners of the scene.
+    let half = (FOV_Y_DEG.to_radians() / 2.0).tan() / 1.25;
     let around = (0..8).map(|step| (f64::from(step) * 45.0, -30.0));
     let above = (0..4).map(|step| (f64::from(step) * 90.0 + 20.0, -60.0));
     let mut pictures = Vec::new();
     for (yaw, pitch) in around.chain(above) {
         let rotation = from_angles(scene.up, yaw, pitch, 0.0);
+        let corners = (0..8).map(|corner| {
+            let side = |axis: usize| bounds[corner >> axis & 1][axis];
+            let seen = rotation.inverse() * (DVec3::new(side(0), side(1), side(2)) - middle);
+            seen.z + seen.x.abs().max(seen.y.abs()) / half
+        });
+        let away = corners.fold(0.0, f64::max);
         let position = middle - rotation * DVec3::NEG_Z * away;
         let pose = Pose { position, rotation, fov_y_deg: FOV_Y_DEG };
         renderer.draw(&nodes, &pose, (away * 1e-3) as f32)?;
-        pictures.push(renderer.snapshot()?);
+        let (mut picture, coverage) = (renderer.snapshot()?, renderer.coverage()?);
+        for (pixel, covered) in picture.pixels_mut().zip(coverage.pixels()) {
+            pixel.0[3] = covered.0[0];
+        }
+        pictures.push(picture);
     }
     Ok(pictures)
 }
