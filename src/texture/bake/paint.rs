@@ -3,7 +3,6 @@
 use glam::{DVec2, DVec3};
 
 use super::flat::{FlatChart, for_centres};
-use super::project::{Projection, Shown, TexelPlane};
 use super::source::{Source, SurfacePoint};
 use crate::color;
 use crate::mesh::{Mesh, wide};
@@ -31,10 +30,6 @@ const LEAST_SCALE: f64 = 0.5;
 /// A triangle of the original that was nearest to the texel before is taken again where the texel
 /// lies over it, farther away by no more than so many texels.
 const SLACK: f64 = 0.5;
-
-/// The original is looked for so many texels farther from a triangle than twice what it is from
-/// the triangle's corners.
-const REACH_TEXELS: f64 = 2.0;
 
 /// Times that the scale is fitted to the texels that a node may have.
 const FITS: usize = 4;
@@ -106,7 +101,6 @@ impl BlockTextures<'_> {
         chart: &FlatChart,
         scale: f64,
         level: usize,
-        away: &mut Away,
     ) -> Painted {
         let (corners, size) = chart.on_texels(scale, self.baked_cell(level));
         let [width, height] = size;
@@ -115,30 +109,30 @@ impl BlockTextures<'_> {
         let mut known = BitGrid::new(width, height);
         // Bilinear sampling of the next finer level averages just the texel's own width.
         let finer = (level + 1).min(self.steps.len() - 1);
-        let mut projection = Projection::default();
-        let byte = color::linear_to_byte();
         let mut near = None;
-        for (number, (&triangle, &flat)) in (0..).zip(chart.triangles.iter().zip(&corners)) {
-            let triangle = mesh.triangles[triangle as usize];
-            let Some(plane) = TexelPlane::new(mesh, triangle, flat) else { continue };
-            let farthest = triangle.map(|vertex| away.of(vertex, plane.normal));
-            let reach = 2.0 * farthest.into_iter().fold(0.0, f64::max) + REACH_TEXELS / scale;
-            projection.draw(source, &plane, reach, size, &self.steps);
-            let [columns, rows] = projection.texels();
-            for (y, x) in rows.flat_map(|y| columns.clone().map(move |x| (y, x))) {
-                if owners[y * width + x] != number {
+        let byte = color::linear_to_byte();
+        let to_surface: Vec<TexelToSurface> = chart
+            .triangles
+            .iter()
+            .zip(&corners)
+            .map(|(&triangle, flat)| {
+                TexelToSurface::new(mesh, mesh.triangles[triangle as usize], *flat)
+            })
+            .collect();
+        for y in 0..height {
+            for x in 0..width {
+                let owner = owners[y * width + x];
+                if owner == FREE {
                     continue;
                 }
-                let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-                let color = match projection.at(x, y) {
-                    Some(shown) => self.color_of(source, shown, centre),
-                    None => {
-                        let (point, slack) = (plane.at(centre), SLACK / scale);
-                        near = source.nearest(point, plane.normal, near, slack).or(near);
-                        let Some(nearest) = near else { continue };
-                        self.color_at(source, nearest, finer)
-                    }
+                let to_surface = &to_surface[owner as usize];
+                let point = to_surface.at(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+                let Some(nearest) = source.nearest(point, to_surface.normal, near, SLACK / scale)
+                else {
+                    continue;
                 };
+                near = Some(nearest);
+                let color = self.color_at(source, nearest, finer);
                 pixels[(y * width + x) * 3..][..3]
                     .copy_from_slice(&color.map(|light| byte.of((light * 65535.0) as u16)));
                 known.set(x, y);
@@ -146,17 +140,6 @@ impl BlockTextures<'_> {
         }
         fill::fill_all(&mut pixels, 3, &known);
         Painted { image: LevelImage::own(size, 3, self.steps[level], pixels), corners }
-    }
-
-    /// What a chart's texel shows of the original, linear light, 0–1.
-    fn color_of(&self, source: &Source, shown: &Shown, centre: DVec2) -> [f32; 3] {
-        let triangle = source.triangle(shown.triangle);
-        let Some(Prepared::Atlas(atlas)) = self.textures.get(triangle.texture as usize) else {
-            return [1.0; 3];
-        };
-        let image = &atlas.levels[shown.level as usize];
-        let color = image.light_at((shown.texel(centre) / image.step).to_array());
-        tinted(color, triangle.colors, || shown.weights(centre))
     }
 
     /// What the original shows at a point, at the level's resolution, linear light, 0–1.
@@ -169,50 +152,15 @@ impl BlockTextures<'_> {
         let along = |axis: usize| {
             (0..3).map(|i| point.weights[i] * f64::from(triangle.texels[i][axis])).sum::<f64>()
         };
-        let color = image.light_at([along(0) / image.step, along(1) / image.step]);
-        tinted(color, triangle.colors, || point.weights)
-    }
-}
-
-/// A colour multiplied with the vertex colours of a triangle's corners, weighted.
-fn tinted(
-    mut color: [f32; 3],
-    colors: Option<[[u16; 4]; 3]>,
-    weights: impl Fn() -> [f64; 3],
-) -> [f32; 3] {
-    if let Some(colors) = colors {
-        let weights = weights();
-        for (channel, light) in color.iter_mut().enumerate() {
-            let own = (0..3).map(|i| weights[i] * f64::from(colors[i][channel])).sum::<f64>();
-            *light *= (own / 65535.0) as f32;
+        let mut color = image.light_at([along(0) / image.step, along(1) / image.step]);
+        if let Some(colors) = triangle.colors {
+            for (channel, light) in color.iter_mut().enumerate() {
+                let own =
+                    (0..3).map(|i| point.weights[i] * f64::from(colors[i][channel])).sum::<f64>();
+                *light *= (own / 65535.0) as f32;
+            }
         }
-    }
-    color
-}
-
-/// How far the original is from a node's vertices.
-pub(super) struct Away<'a> {
-    source: &'a Source,
-    mesh: &'a Mesh,
-    /// By vertex; negative where nobody has asked yet.
-    known: Vec<f64>,
-    near: Option<SurfacePoint>,
-}
-
-impl<'a> Away<'a> {
-    pub fn new(source: &'a Source, mesh: &'a Mesh) -> Self {
-        Self { source, mesh, known: vec![-1.0; mesh.positions.len()], near: None }
-    }
-
-    /// The distance of a vertex, metres, seen from a triangle that faces this way.
-    fn of(&mut self, vertex: u32, normal: DVec3) -> f64 {
-        let known = &mut self.known[vertex as usize];
-        if *known < 0.0 {
-            let point = wide(self.mesh.positions[vertex as usize]);
-            self.near = self.source.nearest(point, normal, self.near, 0.0).or(self.near);
-            *known = self.near.map_or(0.0, |near| near.distance);
-        }
-        *known
+        color
     }
 }
 
@@ -279,4 +227,36 @@ fn owners(corners: &[[DVec2; 3]], size: [usize; 2]) -> Vec<u32> {
         }
     }
     owners
+}
+
+/// From a chart's texels to its triangle in space.
+struct TexelToSurface {
+    flat: [DVec2; 3],
+    corners: [DVec3; 3],
+    /// One over twice the area in texels; 0 where it has none.
+    inverse: f64,
+    normal: DVec3,
+}
+
+impl TexelToSurface {
+    fn new(mesh: &Mesh, triangle: [u32; 3], flat: [DVec2; 3]) -> Self {
+        let corners = triangle.map(|vertex| wide(mesh.positions[vertex as usize]));
+        let [a, b, c] = flat;
+        let doubled = (b - a).perp_dot(c - a);
+        let inverse = if doubled.abs() > 1e-6 { 1.0 / doubled } else { 0.0 };
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        Self { flat, corners, inverse, normal: normal.normalize_or_zero() }
+    }
+
+    /// The point of the triangle's plane; of a triangle without area its middle.
+    fn at(&self, texel: DVec2) -> DVec3 {
+        let [a, b, c] = self.flat;
+        let [p, q, r] = self.corners;
+        if self.inverse == 0.0 {
+            return (p + q + r) / 3.0;
+        }
+        let v = (texel - a).perp_dot(c - a) * self.inverse;
+        let w = (b - a).perp_dot(texel - a) * self.inverse;
+        p + (q - p) * v + (r - p) * w
+    }
 }
