@@ -4,10 +4,9 @@
 //!        [--adapter NAME]
 //!
 //! Views are from every 45 degrees around at 30 degrees over the horizon and every 90 at 60. The
-//! scene's box is at most 800 pixels wide and high in the near views, 300 in the far ones. One JSON
-//! object:
-//! by level its triangles and the mean FLIP of the near and of the far views, over the pixels that
-//! either picture has something in. Level N is the last (default 1).
+//! scene's box is at most 800 pixels wide and high in the near views, 300 in the far ones. Prints a
+//! JSON object: by level its triangles and the mean FLIP of the near and of the far views, over the
+//! pixels that either picture has something in. Level N is the last (default 1).
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -39,9 +38,9 @@ fn main() -> Result<()> {
     let arguments = parse()?;
     let scene = Scene::read(&arguments.out)?;
     let mut found = Vec::new();
-    let leaves = arguments.sizes.map(|size| views(&scene, &arguments, size, u32::MAX));
-    let [near, far] = leaves;
-    let leaves = [near?, far?];
+    let [near, far] = arguments.sizes;
+    let of_leaves = |size| views(&scene, &arguments, size, u32::MAX);
+    let leaves = [of_leaves(near)?, of_leaves(far)?];
     for level in 0..=arguments.levels.min(scene.level_count() as u32 - 1) {
         let triangles: u64 = front(&scene, level)
             .iter()

@@ -12,12 +12,9 @@ use super::tree::line;
 use crate::format::Scene;
 use crate::lattice::Quantization;
 
-/// What to try where errors were measured against something else than was built.
-const OTHER_SOURCE: &str = "name the files that the scene was built from, or build it again";
-
 /// Compares stored and measured errors of all coarse nodes. What leaves may be off by rounding is
-/// room for both, and the least that is counted as measured; `steps` are the lattice's. `same_source` says that the scene was built from
-/// what it is compared with, as far as is known.
+/// room for both, and the least that is counted as measured; `steps` are the lattice's.
+/// `same_source` says that the scene was built from what it is compared with, as far as is known.
 pub(super) fn errors(
     scene: &Scene,
     nodes: &[NodeError],
@@ -26,6 +23,13 @@ pub(super) fn errors(
     same_source: bool,
 ) -> (Vec<ErrorFigures>, Check) {
     let mut check = Check::new("stored errors");
+    let [hint_too_small, hint_too_large] = match same_source {
+        true => [
+            "use the measured figure, and report this: the builder's bound does not hold",
+            "detail is loaded that nobody needs; report this: the builder's bound is too loose",
+        ],
+        false => ["name the files that the scene was built from, or build it again"; 2],
+    };
     let mut ratios: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
     let lattice = Quantization::of(&scene.parameters);
     let mut largest: BTreeMap<u32, f64> = BTreeMap::new();
@@ -67,16 +71,7 @@ pub(super) fn errors(
     let count = too_small.len() as u64;
     too_small.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
     for (_, file, what) in too_small {
-        check.fail(
-            file,
-            what,
-            match same_source {
-                true => {
-                    "use the measured figure, and report this: the builder's bound does not hold"
-                }
-                false => OTHER_SOURCE,
-            },
-        );
+        check.fail(file, what, hint_too_small);
     }
     let mut figures = Vec::with_capacity(ratios.len());
     for (level, mut ratios) in ratios {
@@ -98,7 +93,7 @@ pub(super) fn errors(
                 check.fail(
                     format!("level {level}"),
                     format!("stored errors are {figure:.2} times the measured ones {what}, limit {limit}"),
-                    "detail is loaded that nobody needs; report this: the builder's bound is too loose",
+                    hint_too_large,
                 );
             }
         }

@@ -165,7 +165,7 @@ fn parse_bytes(text: &str) -> Result<u64, String> {
 
 fn parse_not_negative(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(number) if number >= 0.0 => Ok(number),
+        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number),
         _ => Err("expected a number of 0 or more".into()),
     }
 }

@@ -17,10 +17,9 @@ pub fn reorientable(material: &Material) -> bool {
 }
 
 /// The triangles with faces of one place become the first of them, and of neighbours that wind
-/// against each other those turned that are less in area; `None` where that changes no more than this
-/// share of them (`few`). Only
-/// faces of materials that are [`reorientable`] change. Texture seams divide nothing here: places
-/// count, not vertices.
+/// against each other those turned that are less in area; `None` where that changes no more than a
+/// share of them (`few`). Only faces of materials that are [`reorientable`] change. Texture seams
+/// divide nothing here: places count, not vertices.
 pub fn oriented(mesh: &Mesh, reorientable: &[bool], few: f64) -> Option<Vec<[u32; 3]>> {
     let places = places_of(mesh);
     let at = |triangle: [u32; 3]| triangle.map(|vertex| places[vertex as usize]);
@@ -51,8 +50,8 @@ pub fn oriented(mesh: &Mesh, reorientable: &[bool], few: f64) -> Option<Vec<[u32
     (changed as f64 > few * mesh.triangles.len() as f64).then_some(triangles)
 }
 
-/// Whether more than a `few` of the faces, a share, lie where others do. The quadrics of such sheets know no border:
-/// folded in at their rims they count as unchanged.
+/// Whether more than a share of the faces (`few`) lie where others do. The quadrics of such sheets
+/// know no border: folded in at their rims they count as unchanged.
 pub fn has_duplicate_faces(mesh: &Mesh, few: f64) -> bool {
     let hasher = FxBuildHasher;
     let hashes: Vec<u64> = mesh.positions.iter().map(|&p| hasher.hash_one(key(p))).collect();
