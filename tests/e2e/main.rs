@@ -19,6 +19,5 @@ mod real_data;
 mod seams;
 mod soups;
 mod tileset;
-mod touching;
 mod verify;
 mod verify_surface;
