@@ -97,8 +97,9 @@ pub(super) fn measure(
         .map(|measured| {
             let node = &geometry[measured.node as usize];
             let mut stats = DistanceStats::default();
-            // Draws that differ from level to level.
-            let stream = scene.nodes[measured.node as usize].id;
+            // Draws that differ from level to level, and that no path of an input decides, as
+            // the ids of nodes do.
+            let stream = u64::from(measured.node);
             for sample in spread(node.surface(), points.density, seed, stream) {
                 stats.add(reference.distance(sample.point));
             }
@@ -217,7 +218,7 @@ mod tests {
             sheet(40.0, 6, 0.4, 5),
         ];
         let leaves = [2, 3, 4];
-        let points = Points::new(&scene, &leaves, &geometry, 600, 9);
+        let points = Points::new(&leaves, &geometry, 600, 9);
         let joined = Assembly::new(leaves.into_iter(), &geometry);
         let source = all(&[&geometry[2], &geometry[3], &geometry[4]]);
         for level in 0..2u32 {
@@ -250,7 +251,7 @@ mod tests {
             assert!((found.to_front.rms() - rms).abs() < 1e-9);
 
             let node = &geometry[level as usize];
-            let spots = spread(node.surface(), points.density, 9, scene.nodes[level as usize].id);
+            let spots = spread(node.surface(), points.density, 9, u64::from(level));
             let distances = spots.iter().map(|sample| naive(sample.point, &source));
             let vertices = node.surface_vertices();
             let max = vertices.iter().map(|&p| naive(p, &source)).chain(distances.clone());

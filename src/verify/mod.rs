@@ -151,7 +151,7 @@ impl Verification<'_> {
         let rims = seams::Rims::new(scene, &leaves, &geometry);
         let seams = rims.seams();
         cut_planes::mark(scene, &mut geometry, &seams, &steps);
-        let points = Points::new(scene, &leaves, &geometry, options.samples, options.seed);
+        let points = Points::new(&leaves, &geometry, options.samples, options.seed);
         let images = NodeTextures::new(out, scene);
 
         progress.phase("images of the leaves", leaves.len() as u64);

@@ -3,7 +3,6 @@
 
 use super::geometry::NodeGeometry;
 use super::sample::{SurfacePoint, spread};
-use crate::format::Scene;
 
 /// Points of all leaves, leaf by leaf.
 pub(super) struct Points {
@@ -19,20 +18,13 @@ pub(super) struct Points {
 
 impl Points {
     /// About `samples` points over the leaves.
-    pub fn new(
-        scene: &Scene,
-        leaves: &[u32],
-        geometry: &[NodeGeometry],
-        samples: u64,
-        seed: u64,
-    ) -> Self {
+    pub fn new(leaves: &[u32], geometry: &[NodeGeometry], samples: u64, seed: u64) -> Self {
         let area: f64 = leaves.iter().map(|&leaf| geometry[leaf as usize].area()).sum();
         let density = if area > 0.0 { samples as f64 / area } else { 0.0 };
         let mut points = Self { all: Vec::new(), leaf: Vec::new(), first: vec![0], density };
         for &leaf in leaves {
             let node = &geometry[leaf as usize];
-            let id = scene.nodes[leaf as usize].id;
-            points.all.extend(spread(node.surface(), density, seed, id));
+            points.all.extend(spread(node.surface(), density, seed, u64::from(leaf)));
             points.leaf.resize(points.all.len(), leaf);
             points.first.push(points.all.len());
         }
