@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for path in models {
         let model = hlod::import::load(Path::new(path))?;
         let bounds = model.bounds();
-        let mesh = gather(&model.materials, &model.parts).mesh;
+        let mesh = gather(&model.materials, &model.parts, &[]).mesh;
         let local = |p: &[f64; 3]| std::array::from_fn(|i| (p[i] - bounds[0][i]) as f32);
         let mesh = Mesh {
             positions: mesh.positions.iter().map(local).collect(),

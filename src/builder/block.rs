@@ -8,6 +8,7 @@ use rustc_hash::FxHashSet;
 use crate::Result;
 use crate::builder::blocks::block_plan::{BlockPlan, Division};
 use crate::builder::blocks::gather::{divide, gather, localise};
+use crate::builder::blocks::merge_adjacent::plan_of_parts;
 use crate::builder::blocks::merge_untextured::merge_untextured;
 use crate::builder::blocks::outliers::set_outliers_aside;
 use crate::builder::blocks::plan::plan;
@@ -21,13 +22,15 @@ use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
 use crate::builder::simplify::orient::reorientable;
 use crate::builder::stages::{Stage, Stages};
+use crate::builder::stitch::{Stitch, stitches};
 use crate::builder::threads::in_parallel;
 use crate::format::{BlockInfo, Encoding, OutputDir};
 use crate::lattice::Lattice;
 use crate::lattice::Quantization;
-use crate::mesh::{Material, Model, Part, PositionKey, UpAxis, Warnings};
+use crate::mesh::{Material, Model, Part, PositionKey, UpAxis, Warnings, key};
 use crate::texture::{
-    BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan, texture_factors,
+    BakeClasses, BlockTextures, Seams, SharedTextures, TextureCache, TextureOptions, TexturePlan,
+    TextureUse, texture_factors,
 };
 
 /// A block whose nodes are written.
@@ -56,6 +59,8 @@ pub struct BuiltInput {
     pub blocks: Vec<BuiltBlock>,
     /// Different source texels that its triangles use, repeating textures aside.
     pub used_texels: u64,
+    /// Open edges between which there are stitches ([`crate::builder::stitch`]).
+    pub stitched_edges: u64,
     /// What was imperfect.
     pub warnings: Warnings,
 }
@@ -70,14 +75,14 @@ struct Draft {
 }
 
 enum DraftSource {
-    Parts(Vec<Part>),
+    Parts(Vec<Part>, Vec<Stitch>),
     Chunk(Box<Chunk<f64>>),
 }
 
 impl DraftSource {
     fn positions(&self) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
         match self {
-            Self::Parts(parts) => {
+            Self::Parts(parts, _) => {
                 Box::new(parts.iter().flat_map(|part| part.positions.iter().copied()))
             }
             Self::Chunk(chunk) => Box::new(chunk.mesh.positions.iter().copied()),
@@ -87,7 +92,7 @@ impl DraftSource {
     /// Positions that no cut made: those on a cutting plane are the plane's business.
     fn uncut_positions(&self) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
         match self {
-            Self::Parts(_) => self.positions(),
+            Self::Parts(..) => self.positions(),
             Self::Chunk(chunk) => {
                 let bits = 0..chunk.path.len() as u32;
                 let shared = bits.filter(|&bit| is_of_shared(chunk.path.plane(bit)));
@@ -132,9 +137,22 @@ pub fn build_input(
     }
     merge_untextured(&mut model);
     let HierarchyOptions { desired_tris, constants, .. } = &options.hierarchy;
-    let plans = plan(&model, options.blocks, *desired_tris, up, &constants.blocks);
     let texture_plan = TexturePlan::new(&model);
-    let drafts = drafts(&mut model, plans, options, stages);
+    let is_cut_up = |material: u32| {
+        let texture = texture_plan.texture_of(material);
+        texture.map(|texture| texture_plan.texture_use(texture)) == Some(TextureUse::Atlas)
+            && options.hierarchy.seams != Seams::Keep
+    };
+    let classes = BakeClasses::new(&model.materials, is_cut_up);
+    let is_plain = |&material: &u32| texture_plan.texture_of(material).is_none();
+    let plain = |part: &Part| Some(part.material).filter(is_plain);
+    let kind = |part: &Part| classes.of(part.material).or_else(|| plain(part));
+    let kinds = model.parts.iter().map(kind).collect();
+    let stitches = stages.time(Stage::Gather, || stitches(&model.parts, kinds, &constants.stitch));
+    let plans = plan(&model, options.blocks, *desired_tris, up, &stitches, &constants.blocks);
+    let stitched_edges = stitches.len() as u64;
+    let (stitches, across) = by_plan(&plans, stitches, model.parts.len());
+    let drafts = drafts(&mut model, plans, stitches, options, stages);
     let lattice_of = |drafts: &mut dyn Iterator<Item = &Draft>| {
         let fine = lattice_of(drafts);
         if let Some(Quantization { step }) = quantization.filter(|coarse| coarse.step < fine.step) {
@@ -153,7 +171,9 @@ pub fn build_input(
     }
     let shared_vertices = stages.time(Stage::Gather, || {
         let bounds: Vec<_> = drafts.iter().map(|draft| draft.source.bounds()).collect();
-        shared_positions(&bounds, |block| drafts[block].source.uncut_positions())
+        let mut shared = shared_positions(&bounds, |block| drafts[block].source.uncut_positions());
+        shared.extend(across);
+        shared
     });
     let cache = TextureCache::new(
         &model,
@@ -175,7 +195,7 @@ pub fn build_input(
         let origin = lattice.origin_near(std::array::from_fn(|i| (low[i] + high[i]) * 0.5));
         let (chunk, collapsed) = stages.time(Stage::Gather, || {
             let mut chunk = match source {
-                DraftSource::Parts(parts) => gather(&model.materials, &parts),
+                DraftSource::Parts(parts, stitches) => gather(&model.materials, &parts, &stitches),
                 DraftSource::Chunk(chunk) => *chunk,
             };
             keep_shared(&mut chunk, &shared_vertices);
@@ -248,13 +268,35 @@ pub fn build_input(
         used_texels += texels;
     }
     warnings.extend(cache.warnings());
-    Ok(BuiltInput { blocks, used_texels, warnings })
+    Ok(BuiltInput { blocks, used_texels, stitched_edges, warnings })
+}
+
+/// The stitches within each plan, and the positions between which there are stitches from one plan
+/// to another. These stay at every level, as those do that blocks have in common.
+fn by_plan(
+    plans: &[BlockPlan],
+    stitches: Vec<Stitch>,
+    parts: usize,
+) -> (Vec<Vec<Stitch>>, FxHashSet<PositionKey<f64>>) {
+    let plan_of = plan_of_parts(plans, parts);
+    let mut within = vec![Vec::new(); plans.len()];
+    let mut across = FxHashSet::default();
+    for stitch in stitches {
+        let [a, b] = stitch.parts.map(|part| plan_of[part as usize]);
+        if a == b {
+            within[a].push(stitch);
+        } else {
+            across.extend([stitch.edge[0], stitch.edge[1], stitch.apex].map(key));
+        }
+    }
+    (within, across)
 }
 
 /// Takes the parts out of the model and divides those blocks that are to be divided.
 fn drafts(
     model: &mut Model,
     plans: Vec<BlockPlan>,
+    stitches: Vec<Vec<Stitch>>,
     options: &BuildOptions,
     stages: &Stages,
 ) -> Vec<Draft> {
@@ -273,9 +315,11 @@ fn drafts(
         true => stages.time(Stage::Gather, || shared_by_parts(&planned)),
         false => FxHashSet::default(),
     };
-    let drafts_of =
-        |(plan, parts)| drafts_of_plan(&model.materials, plan, parts, &shared, options, stages);
-    let drafts: Vec<Vec<Draft>> = planned.into_par_iter().map(drafts_of).collect();
+    let materials = &model.materials;
+    let drafts_of = |((plan, parts), stitches)| {
+        drafts_of_plan(materials, plan, parts, stitches, &shared, options, stages)
+    };
+    let drafts: Vec<Vec<Draft>> = planned.into_par_iter().zip(stitches).map(drafts_of).collect();
     drafts.into_iter().flatten().collect()
 }
 
@@ -293,6 +337,7 @@ fn drafts_of_plan(
     materials: &[Material],
     BlockPlan { name, divide: division, .. }: BlockPlan,
     parts: Vec<Part>,
+    stitches: Vec<Stitch>,
     shared: &FxHashSet<PositionKey<f64>>,
     options: &BuildOptions,
     stages: &Stages,
@@ -303,14 +348,21 @@ fn drafts_of_plan(
     if !far.is_empty() {
         let name = format!("{name} (far off)");
         let materials = materials_of(far.iter().map(|part| part.material).collect());
-        drafts.push(Draft { name, far: true, source: DraftSource::Parts(far), materials });
+        drafts.push(Draft {
+            name,
+            far: true,
+            source: DraftSource::Parts(far, Vec::new()),
+            materials,
+        });
     }
     if division == Division::Whole {
         let materials = materials_of(parts.iter().map(|part| part.material).collect());
-        drafts.push(Draft { name, far: false, source: DraftSource::Parts(parts), materials });
+        let source = DraftSource::Parts(parts, stitches);
+        drafts.push(Draft { name, far: false, source, materials });
         return drafts;
     }
-    let mut chunk = stages.time(Stage::Gather, || gather(materials, &parts));
+    let mut chunk = stages.time(Stage::Gather, || gather(materials, &parts, &stitches));
+    drop(stitches);
     drop(parts);
     keep_shared(&mut chunk, shared);
     chunk.moved = options.quantize.map(|_| vec![0.0; chunk.mesh.positions.len()]);

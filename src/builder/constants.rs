@@ -16,6 +16,8 @@ pub struct Constants {
     pub blocks: BlockConstants,
     /// How deep trees are.
     pub tree: TreeConstants,
+    /// Which borders touch.
+    pub stitch: StitchConstants,
     /// Where cutting planes go.
     pub cut: CutConstants,
     /// What borders keep, and what closes them.
@@ -52,6 +54,25 @@ pub struct BlockConstants {
 impl Default for BlockConstants {
     fn default() -> Self {
         Self { small_group: 4, merged: 16, large_group: 400, divided: 128, welded: 8, uncut: 32 }
+    }
+}
+
+/// Which borders of the source touch ([`crate::builder::stitch`]).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StitchConstants {
+    /// Borders touch that are no farther apart than this share of the surface's resolution, 0 or
+    /// more; 0: none do.
+    pub resolution: f64,
+    /// Parts with fewer triangles have the resolution of the whole input, 0 or more.
+    pub small_part: usize,
+    /// The resolution is found from about so many triangles, 1 or more.
+    pub sampled: usize,
+}
+
+impl Default for StitchConstants {
+    fn default() -> Self {
+        Self { resolution: 0.8, small_part: 256, sampled: 4096 }
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! - [`pipeline`]: the whole build; [`block`]: one input to the trees of its blocks
 //! - [`blocks`]: what a block is: groups merged, divided and gathered
+//! - [`stitch`]: borders of the source that touch without sharing vertices
 //! - [`hierarchy`]: the tree of one block
 //! - [`cut`]: planes, and the triangles that cross them
 //! - [`border`]: what planes leave behind: thinning, skirts, caps
@@ -26,6 +27,7 @@ pub mod progress;
 pub mod reuse;
 pub mod simplify;
 pub mod stages;
+pub mod stitch;
 pub mod threads;
 pub mod up;
 

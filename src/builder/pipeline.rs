@@ -189,6 +189,7 @@ impl Run<'_> {
             files,
             triangles,
             texels: built.used_texels,
+            stitched_edges: built.stitched_edges,
             up,
             up_from: Some(up_from),
             outcomes,

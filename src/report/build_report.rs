@@ -64,6 +64,10 @@ pub struct InputReport {
     pub triangles: u64,
     /// Different texels that its triangles use, repeating textures aside.
     pub texels: u64,
+    /// Open edges of it that touch other borders without sharing vertices, and are joined with them
+    /// on all levels but the leaves'.
+    #[serde(default)]
+    pub stitched_edges: u64,
     /// Which of its axes points at the sky.
     pub up: UpAxis,
     /// How that is known; `None` in results of versions that did not say.

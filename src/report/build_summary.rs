@@ -63,6 +63,13 @@ pub fn built(report: &BuildReport, out: &Path) -> String {
         report.peak_memory_bytes as f64 / 1e6
     );
     let _ = writeln!(text, "  {}", orientation(report));
+    let stitched: u64 = report.inputs.iter().map(|input| input.stitched_edges).sum();
+    if stitched > 0 {
+        let _ = writeln!(
+            text,
+            "  {stitched} border edges touch others without shared vertices: joined on coarse levels"
+        );
+    }
     if let Some(quantized) = &report.quantized {
         let Quantized { step_metres, bound_metres, large_nodes } = quantized;
         let _ = write!(

@@ -27,17 +27,25 @@ const FACING: f64 = 0.98;
 type Plane = (usize, u64);
 
 /// Marks the triangles of coarse nodes that lie in a plane at which they were cut.
-pub(super) fn mark(scene: &Scene, geometry: &mut [NodeGeometry], seams: &[Seam], steps: &[f64]) {
+/// Each list of seams finds planes by itself.
+pub(super) fn mark(
+    scene: &Scene,
+    geometry: &mut [NodeGeometry],
+    seams: [&[Seam]; 2],
+    steps: &[f64],
+) {
     let mut planes: Vec<BTreeSet<Plane>> = vec![BTreeSet::new(); geometry.len()];
-    let mut pairs: BTreeMap<[u32; 2], Vec<&Seam>> = BTreeMap::new();
-    for seam in seams {
-        pairs.entry(seam.leaves).or_default().push(seam);
-    }
-    for ([a, b], seams) in pairs {
-        let nodes = [a, b].map(|leaf| &scene.nodes[leaf as usize]);
-        if let Some(plane) = plane_between(&seams, nodes, steps[a as usize]) {
-            for node in apart(scene, a, b).concat() {
-                planes[node as usize].insert(plane);
+    for seams in seams {
+        let mut pairs: BTreeMap<[u32; 2], Vec<&Seam>> = BTreeMap::new();
+        for seam in seams {
+            pairs.entry(seam.leaves).or_default().push(seam);
+        }
+        for ([a, b], seams) in pairs {
+            let nodes = [a, b].map(|leaf| &scene.nodes[leaf as usize]);
+            if let Some(plane) = plane_between(&seams, nodes, steps[a as usize]) {
+                for node in apart(scene, a, b).concat() {
+                    planes[node as usize].insert(plane);
+                }
             }
         }
     }
@@ -169,7 +177,7 @@ mod tests {
                 geometry_of(&[&far]),
             ];
             geometry[1].skirts = skirts.to_vec();
-            mark(&scene, &mut geometry, &seams, &[1e-6; 5]);
+            mark(&scene, &mut geometry, [&seams, &[]], &[1e-6; 5]);
             let marked: Vec<bool> = (0..3).map(|t| !geometry[1].is_surface(t)).collect();
             assert_eq!(marked, expected, "{skirts:?}");
         }

@@ -150,7 +150,8 @@ impl Verification<'_> {
         report.scene = Some(facts(scene, &leaves, &geometry, &steps));
         let rims = seams::Rims::new(scene, &leaves, &geometry);
         let seams = rims.seams();
-        cut_planes::mark(scene, &mut geometry, &seams, &steps);
+        let between = rims.between_vertices();
+        cut_planes::mark(scene, &mut geometry, [&seams, &between], &steps);
         let points = Points::new(&leaves, &geometry, options.samples, options.seed);
         let images = NodeTextures::new(out, scene);
 

@@ -124,6 +124,31 @@ impl<'a> Rims<'a> {
         seams
     }
 
+    /// Edges of one leaf alone that lie between two vertices of another's rim, once for each such
+    /// other: where a cutting plane passes through borders of the source that have vertices within
+    /// each other's edges, no edge is shared.
+    pub fn between_vertices(&self) -> Vec<Seam> {
+        let alone = || self.equal().filter(|same| same.len() == 1).map(|same| same[0]);
+        let mut leaves_at: FxHashMap<PositionKey<f64>, Vec<u32>> = FxHashMap::default();
+        for (edge, leaf) in alone() {
+            for end in edge.keys {
+                let leaves = leaves_at.entry(end).or_default();
+                if !leaves.contains(&leaf) {
+                    leaves.push(leaf);
+                }
+            }
+        }
+        let mut seams = Vec::new();
+        for (edge, leaf) in alone() {
+            let [from, to] = edge.keys.map(|end| &leaves_at[&end]);
+            let others = from.iter().filter(|&&other| other != leaf && to.contains(&other));
+            let seam =
+                |&other: &u32| Seam { ends: edge.ends, leaves: [leaf.min(other), leaf.max(other)] };
+            seams.extend(others.map(seam));
+        }
+        seams
+    }
+
     /// The edges at which the leaves of an input end, all together, and a leaf that has each.
     pub fn open(&self) -> Vec<([DVec3; 2], u32)> {
         let mut open = Vec::new();
@@ -176,6 +201,22 @@ mod tests {
         assert!(open.iter().all(|(ends, _)| *ends != [x, x + DVec3::Y]));
         let corners: Vec<DVec3> = (0..4).map(|vertex| nodes[1].position(vertex)).collect();
         assert_eq!(open_edges(&corners, nodes[1].triangles.iter().copied()).len(), 4);
+
+        // The third begins half way along the second; one that is twice as high has the second's
+        // side within its own.
+        assert_eq!(rims.between_vertices(), []);
+        let mut high = square(101.0, -1.0);
+        high.positions[2][1] = 2.0;
+        high.positions[3][1] = 2.0;
+        let mut halves = square(101.0, 0.0);
+        halves.positions.extend([[1.0, 2.0, 0.0], [0.0, 2.0, 0.0]]);
+        halves.triangles.extend([[3, 2, 4], [3, 4, 5]]);
+        let nodes = [high, halves];
+        let rims = Rims::new(&scene, &[0, 1], &nodes);
+        assert_eq!(rims.seams(), []);
+        let ends = [x, x + DVec3::Y * 2.0];
+        assert_eq!(rims.between_vertices(), [Seam { ends, leaves: [0, 1] }]);
+        let nodes = [square(100.0, 0.0), square(101.0, 0.0), square(102.0, 0.5)];
 
         // Two inputs that touch end there, each for itself.
         scene.blocks[1].input = "other.obj".into();

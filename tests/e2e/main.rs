@@ -19,5 +19,6 @@ mod real_data;
 mod seams;
 mod soups;
 mod tileset;
+mod touching;
 mod verify;
 mod verify_surface;

@@ -12,16 +12,19 @@ use crate::builder::cut::plane::{Region, best_plane};
 use crate::builder::cut::split::{Chunk, Cut, CutTolerance, cut};
 use crate::builder::cut::uncut::UncutComponents;
 use crate::builder::stages::{Stage, Stages};
+use crate::builder::stitch::Stitch;
 use crate::lattice::Lattice;
 use crate::lattice::Quantization;
-use crate::mesh::{Material, Mesh, Part, PositionKey, all_differ, color_key, key, texcoord_key};
+use crate::mesh::{
+    Material, Mesh, Part, PositionKey, all_differ, color_key, key, texcoord_key, wide,
+};
 
 /// What makes two source vertices one.
 type VertexKey = (PositionKey<f64>, u64, u64, u32);
 
 /// Joins parts into one chunk; vertices that are equal in position, texture coordinate, colour
-/// and material become one.
-pub fn gather(materials: &[Material], parts: &[Part]) -> Chunk<f64> {
+/// and material become one. Of `between`, those whose edge and apex are there become its stitches.
+pub fn gather(materials: &[Material], parts: &[Part], between: &[Stitch]) -> Chunk<f64> {
     let textured = |part: &Part| {
         materials[part.material as usize].texture.is_some() && !part.texcoords.is_empty()
     };
@@ -57,8 +60,62 @@ pub fn gather(materials: &[Material], parts: &[Part]) -> Chunk<f64> {
             mesh.triangles.push(corners.map(|vertex| new_index[vertex as usize]));
         }
     }
+    let stitches = match between.is_empty() {
+        true => Vec::new(),
+        false => stitched(&mut mesh, between),
+    };
     let border = Border::interior(mesh.positions.len());
-    Chunk { mesh, border, ..Chunk::default() }
+    Chunk { mesh, border, stitches, ..Chunk::default() }
+}
+
+/// The triangles of stitches over a mesh. Each looks like the vertices of its edge: the apex gets a
+/// vertex that looks like the nearer of them, where it has none.
+fn stitched(mesh: &mut Mesh<f64>, between: &[Stitch]) -> Vec<[u32; 3]> {
+    let of_stitch = |stitch: &Stitch| [stitch.edge[0], stitch.edge[1], stitch.apex].map(key);
+    let mut at: FxHashMap<PositionKey<f64>, Vec<u32>> =
+        between.iter().flat_map(of_stitch).map(|position| (position, Vec::new())).collect();
+    let mut is_there = vec![false; mesh.positions.len()];
+    for (vertex, &position) in mesh.positions.iter().enumerate() {
+        if let Some(vertices) = at.get_mut(&key(position)) {
+            vertices.push(vertex as u32);
+            is_there[vertex] = true;
+        }
+    }
+    let mut edges: FxHashMap<[PositionKey<f64>; 2], [u32; 2]> = FxHashMap::default();
+    for &[a, b, c] in &mesh.triangles {
+        for ends in [[a, b], [b, c], [c, a]] {
+            if ends.iter().all(|&end| is_there[end as usize]) {
+                edges.insert(ends.map(|end| key(mesh.positions[end as usize])), ends);
+            }
+        }
+    }
+    let mut stitches = Vec::with_capacity(between.len());
+    for stitch in between {
+        let (Some(&[a, b]), Some(vertices)) =
+            (edges.get(&stitch.edge.map(key)), at.get_mut(&key(stitch.apex)))
+        else {
+            continue;
+        };
+        if vertices.is_empty() {
+            continue;
+        }
+        let apex = wide(stitch.apex);
+        let [from_a, from_b] = stitch.edge.map(|end| wide(end).distance_squared(apex));
+        let like = if from_a <= from_b { a } else { b };
+        let looks = |vertex: u32| {
+            let vertex = vertex as usize;
+            (mesh.texcoords.get(vertex), mesh.colors.get(vertex), mesh.materials[vertex])
+        };
+        let known = vertices.iter().copied().find(|&vertex| looks(vertex) == looks(like));
+        let apex = known.unwrap_or_else(|| {
+            let vertex = mesh.push_copy(like as usize);
+            mesh.positions[vertex as usize] = stitch.apex;
+            vertices.push(vertex);
+            vertex
+        });
+        stitches.push([b, a, apex]);
+    }
+    stitches
 }
 
 /// Cuts a gathered chunk into the blocks of a [`Division`], in a fixed order.
@@ -181,7 +238,7 @@ pub fn localise(
     let local = |position: [f64; 3]| -> [f32; 3] {
         std::array::from_fn(|i| lattice.offset(position[i], origin[i]) + 0.0)
     };
-    let Chunk { mesh, border, path: wide_path, moved } = chunk;
+    let Chunk { mesh, border, path: wide_path, mut stitches, moved } = chunk;
     let moved = follow.then(|| {
         let off = |p: &[f64; 3]| {
             p.map(|c| (lattice.round(c) - c).powi(2)).iter().sum::<f64>().sqrt() as f32
@@ -198,7 +255,9 @@ pub fn localise(
     };
     let before = mesh.triangles.len();
     let positions = &mesh.positions;
-    mesh.triangles.retain(|corners| all_differ(corners.map(|vertex| positions[vertex as usize])));
+    let is_one = |corners: &[u32; 3]| all_differ(corners.map(|vertex| positions[vertex as usize]));
+    mesh.triangles.retain(is_one);
+    stitches.retain(is_one);
     let dropped = (before - mesh.triangles.len()) as u64;
     let mut path = Path::default();
     for bit in 0..wide_path.len() as u32 {
@@ -214,5 +273,5 @@ pub fn localise(
         let coordinate = lattice.offset(plane.coordinate, origin[plane.axis]);
         path = path.with(Arc::new(CutPlane::from_chains(plane.axis, coordinate, chains)));
     }
-    (Chunk { mesh, border, path, moved }, dropped)
+    (Chunk { mesh, border, path, stitches, moved }, dropped)
 }

@@ -10,14 +10,16 @@ use std::collections::BTreeMap;
 
 use crate::builder::blocks::block_plan::{BlockPlan, Division};
 use crate::builder::border::shared::{Bounds, bounds_of, each_shared};
+use crate::builder::stitch::Stitch;
 use crate::mesh::{Model, Part};
 
-/// Joins the plans that have more than `most` vertices in common with others, each with the plan
-/// that it has most in common with, until none has. The results have at most `triangles` triangles
-/// or as many as the largest of those joined, cut if need be.
+/// Joins the plans that have more than `most` vertices in common with others, or as many `stitches`
+/// to them, each with the plan that it has most in common with, until none has. The results have at
+/// most `triangles` triangles or as many as the largest of those joined, cut if need be.
 pub fn merge_adjacent(
     model: &Model,
     plans: Vec<BlockPlan>,
+    stitches: &[Stitch],
     most: usize,
     triangles: usize,
 ) -> Vec<BlockPlan> {
@@ -28,6 +30,13 @@ pub fn merge_adjacent(
     each_shared(&bounds, positions, |_, first, other| {
         *shared.entry([first, other]).or_default() += 1;
     });
+    let plan_of = plan_of_parts(&plans, model.parts.len());
+    for stitch in stitches {
+        let [a, b] = stitch.parts.map(|part| plan_of[part as usize]);
+        if a != b {
+            *shared.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
     let set_of = joined(plans.len(), &shared, most);
     let mut sets: BTreeMap<usize, Vec<BlockPlan>> = BTreeMap::new();
     for (plan, set) in plans.into_iter().zip(set_of) {
@@ -47,6 +56,15 @@ pub fn merge_adjacent(
         })
     };
     sets.into_values().filter_map(together).collect()
+}
+
+/// Of each part of a model the plan that has it.
+pub fn plan_of_parts(plans: &[BlockPlan], parts: usize) -> Vec<usize> {
+    let mut plan_of = vec![usize::MAX; parts];
+    for (number, plan) in plans.iter().enumerate() {
+        plan.parts.iter().for_each(|&part| plan_of[part] = number);
+    }
+    plan_of
 }
 
 fn parts_of<'a>(model: &'a Model, plan: &'a BlockPlan) -> impl Iterator<Item = &'a Part> {
@@ -139,15 +157,15 @@ mod tests {
         };
         let plans: Vec<BlockPlan> = (0..4).map(plan).collect();
         // 41 vertices on each of three lines; the inner groups have two.
-        assert_eq!(merge_adjacent(&model, plans.clone(), 82, 1), plans);
-        let two = merge_adjacent(&model, plans.clone(), 81, 1);
+        assert_eq!(merge_adjacent(&model, plans.clone(), &[], 82, 1), plans);
+        let two = merge_adjacent(&model, plans.clone(), &[], 81, 1);
         assert_eq!(two.len(), 2, "both inner groups with the first: {two:?}");
         assert_eq!(two[1], plans[3]);
-        let one = merge_adjacent(&model, plans.clone(), 40, 300);
+        let one = merge_adjacent(&model, plans.clone(), &[], 40, 300);
         let [one] = &one[..] else { panic!("{one:?}") };
         assert_eq!((&one.parts[..], &one.name[..]), (&[0, 1, 2, 3][..], "0"));
         assert_eq!(one.divide, Division::Halves { most: 300 });
-        let [one] = &merge_adjacent(&model, plans, 40, 1)[..] else { panic!() };
+        let [one] = &merge_adjacent(&model, plans, &[], 40, 1)[..] else { panic!() };
         assert_eq!(one.divide, Division::Halves { most: 240 }, "no smaller than they were");
     }
 }

@@ -8,6 +8,7 @@
 use crate::builder::blocks::block_plan::{BlockPlan, Division};
 use crate::builder::blocks::merge_adjacent::merge_adjacent;
 use crate::builder::constants::BlockConstants;
+use crate::builder::stitch::Stitch;
 use crate::mesh::{Model, UpAxis};
 
 /// How blocks are made.
@@ -64,6 +65,7 @@ pub fn plan(
     mode: BlockMode,
     desired_tris: u32,
     up: UpAxis,
+    stitches: &[Stitch],
     constants: &BlockConstants,
 ) -> Vec<BlockPlan> {
     let &BlockConstants { small_group, merged, large_group, divided, welded, .. } = constants;
@@ -113,7 +115,7 @@ pub fn plan(
             }
             plans.sort_by_key(|(first, _)| *first);
             let plans = plans.into_iter().map(|(_, plan)| plan).collect();
-            merge_adjacent(model, plans, budget / welded, merged * budget)
+            merge_adjacent(model, plans, stitches, budget / welded, merged * budget)
         }
     }
 }

@@ -12,6 +12,7 @@
 //! New vertices are computed from the edge's ends in an order that depends on the positions alone
 //! and rounded to the lattice, so they are equal in every bit wherever the edge is met.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -49,6 +50,9 @@ pub struct Chunk<C: Coordinate = f32> {
     pub border: Border,
     /// The planes on the way here.
     pub path: Path<C>,
+    /// Triangles between borders that touch ([`crate::builder::stitch`]), over the mesh's vertices:
+    /// part of what is simplified, not of the source.
+    pub stitches: Vec<[u32; 3]>,
     /// By how much cuts have moved each vertex off the surface, metres at most; `None` where that is
     /// too little to be followed.
     pub moved: Option<Vec<f32>>,
@@ -84,47 +88,61 @@ const ABOVE: i8 = 1;
 
 /// Cuts `chunk`; either side may be empty of triangles.
 pub fn cut<C: Coordinate>(chunk: Chunk<C>, cut: &Cut<C>) -> (Chunk<C>, Chunk<C>) {
-    let Chunk { mut mesh, mut border, path, mut moved } = chunk;
+    let Chunk { mut mesh, mut border, path, mut stitches, mut moved } = chunk;
+    // Behind the triangles from here on, on both sides too.
+    let source = mesh.triangles.len();
+    mesh.triangles.append(&mut stitches);
     let mut labels = label(&mesh, &border, cut);
-    let halves = split(&mut mesh, &mut border, &mut labels, &mut moved, cut);
+    let halves = split(&mut mesh, source, &mut border, &mut labels, &mut moved, cut);
     let plane = Arc::new(make_plane(&mesh, &border, &labels, &halves, cut));
     let path_below = path.with(Arc::clone(&plane));
     let path_above = path_below.clone();
     let bit = path.len() as u32;
     let shared = shared_positions(&mesh, &labels, &halves);
-    let side = |triangles: &[[u32; 3]], path| {
-        let apart = moved.is_some().then(|| without_collapsed(&mesh, &labels, triangles)).flatten();
-        let triangles = apart.as_deref().unwrap_or(triangles);
-        let (mesh, border, used) =
-            extract(&mesh, &border, triangles, &labels, &shared, &plane, bit);
+    let side = |triangles: &[[u32; 3]], source: usize, path| {
+        let apart = moved.is_some().then(|| without_collapsed(&mesh, &labels, triangles, source));
+        let (triangles, source) = match apart.flatten() {
+            Some((kept, source)) => (Cow::Owned(kept), source),
+            None => (Cow::Borrowed(triangles), source),
+        };
+        let (mut mesh, border, used) =
+            extract(&mesh, &border, &triangles, &labels, &shared, &plane, bit);
+        let stitches = mesh.triangles.split_off(source);
         let of_side =
             |moved: &Vec<f32>| used.iter().map(|&vertex| moved[vertex as usize]).collect();
         let moved = moved.as_ref().map(of_side);
-        Chunk { mesh, border, path, moved }
+        Chunk { mesh, border, path, stitches, moved }
     };
-    (side(&halves.below, path_below), side(&halves.above, path_above))
+    let [below, above] = halves.source;
+    (side(&halves.below, below, path_below), side(&halves.above, above, path_above))
 }
 
-/// Triangles without those of which two corners meet, as rounded crossings may where rounding shows;
-/// `None` where there are none such. Both sides may drop them: of the edges of such a triangle one
-/// has no length, and the others are one. It stays where a vertex beside the plane would be lost.
+/// Triangles without those of which two corners meet, as rounded crossings may where rounding shows,
+/// and how many of the first `source` are left; `None` where there are none such. Both sides may
+/// drop them: of the edges of such a triangle one has no length, and the others are one. It stays
+/// where a vertex beside the plane would be lost to the source.
 fn without_collapsed<C: Coordinate>(
     mesh: &Mesh<C>,
     labels: &[i8],
     triangles: &[[u32; 3]],
-) -> Option<Vec<[u32; 3]>> {
+    source: usize,
+) -> Option<(Vec<[u32; 3]>, usize)> {
     let collapsed =
         |triangle: &[u32; 3]| !all_differ(triangle.map(|vertex| mesh.positions[vertex as usize]));
     if !triangles.iter().any(collapsed) {
         return None;
     }
+    let (of_source, stitches) = triangles.split_at(source);
     let mut used = vec![false; mesh.positions.len()];
-    for triangle in triangles.iter().filter(|triangle| !collapsed(triangle)) {
+    for triangle in of_source.iter().filter(|triangle| !collapsed(triangle)) {
         triangle.iter().for_each(|&vertex| used[vertex as usize] = true);
     }
     let lost = |vertex: u32| labels[vertex as usize] != ON && !used[vertex as usize];
-    let kept = |triangle: &&[u32; 3]| !collapsed(triangle) || triangle.iter().any(|&v| lost(v));
-    Some(triangles.iter().filter(kept).copied().collect())
+    let stays = |triangle: &&[u32; 3]| !collapsed(triangle) || triangle.iter().any(|&v| lost(v));
+    let mut kept: Vec<[u32; 3]> = of_source.iter().filter(stays).copied().collect();
+    let source = kept.len();
+    kept.extend(stitches.iter().filter(|triangle| !collapsed(triangle)));
+    Some((kept, source))
 }
 
 /// Triangles of the two sides, and the edges along which crossing triangles were split.
@@ -132,6 +150,8 @@ fn without_collapsed<C: Coordinate>(
 struct Halves {
     below: Vec<[u32; 3]>,
     above: Vec<[u32; 3]>,
+    /// How many of `below` and `above` are of the source; stitches follow.
+    source: [usize; 2],
     /// Of `below` and `above`, those triangles that have a corner on the plane.
     touching: [Vec<[u32; 3]>; 2],
     split_edges: Vec<[u32; 2]>,
@@ -231,6 +251,7 @@ fn order<C: Coordinate>(mesh: &Mesh<C>, vertex: u32) -> PositionKey<C> {
 
 fn split<C: Coordinate>(
     mesh: &mut Mesh<C>,
+    source: usize,
     border: &mut Border,
     labels: &mut Vec<i8>,
     moved: &mut Option<Vec<f32>>,
@@ -243,7 +264,7 @@ fn split<C: Coordinate>(
         ..Halves::default()
     };
     let mut made: FxHashMap<(u32, u32), u32> = FxHashMap::default();
-    for triangle in triangles {
+    for (number, triangle) in triangles.into_iter().enumerate() {
         let [a, b, c] = triangle;
         let side = [labels[a as usize], labels[b as usize], labels[c as usize]];
         let (low, high) = (side[0].min(side[1]).min(side[2]), side[0].max(side[1]).max(side[2]));
@@ -269,6 +290,9 @@ fn split<C: Coordinate>(
                 };
                 split_triangle(triangle, side, &mut crossing, &mut halves);
             }
+        }
+        if number < source {
+            halves.source = [halves.below.len(), halves.above.len()];
         }
     }
     halves

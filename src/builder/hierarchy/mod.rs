@@ -10,6 +10,7 @@ pub mod node;
 pub mod options;
 pub mod shape;
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -25,6 +26,7 @@ use crate::builder::border::span::original_spans;
 use crate::builder::border::vertex::Border;
 use crate::builder::cut::split::Chunk;
 use crate::builder::error::{Original, SurfaceError};
+use crate::builder::simplify::compact::renumber;
 use crate::builder::simplify::merge::merge;
 use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::{Stage, Stages};
@@ -90,6 +92,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let path = chunk.path.clone();
         let node = CoarseNode { path: &path, resolution, child_path, budget };
         let mesh = chunk.mesh.clone();
+        let stitches = chunk.stitches.clone();
         let (border, moved) = (chunk.border.clone(), self.moved(&chunk));
         let parent = Parent { resolution, triangles: mesh.triangles.len() };
         let parallel = parent.triangles > PARALLEL * self.options.desired_tris as usize;
@@ -107,7 +110,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let all_leaves = children.iter().all(|(_, plan)| *plan == NodePlan::Leaf);
         if all_leaves || self.options.simplify_from == SimplifyFrom::Original {
             let from_original = || {
-                let source = self.original(mesh, border, moved, &node);
+                let source = self.original(mesh, border, stitches, moved, &node);
                 self.coarse_node(source, node)
             };
             let (coarse, built) =
@@ -116,7 +119,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             let children = built.into_iter().map(|built| built.tree).collect();
             return Ok(Built { tree: Tree { record, children }, surface: Some(surface) });
         }
-        drop((mesh, border));
+        drop((mesh, border, stitches));
         let built = self.children(children, child_path, parallel, true)?;
         let (trees, surfaces): (Vec<_>, Vec<_>) =
             built.into_iter().map(|built| (built.tree, built.surface)).unzip();
@@ -149,7 +152,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let triangles = chunk.mesh.triangles.len();
         let resolution = self.resolutions.last();
         let record = self.sink.take(&NodeDraft {
-            mesh: &chunk.mesh,
+            mesh: &source_of(&chunk.mesh, &chunk.stitches),
             skirts: &[],
             resolution,
             child_path,
@@ -163,23 +166,41 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let surface = wanted.then(|| {
             let path = chunk.path.clone();
             let node = CoarseNode { path: &path, resolution, child_path, budget: triangles };
-            self.original(chunk.mesh, chunk.border, moved, &node)
+            self.original(chunk.mesh, chunk.border, chunk.stitches, moved, &node)
         });
         Ok(Built { tree: Tree { record, children: Vec::new() }, surface })
     }
 
-    /// A chunk of the original as what a node is simplified from.
-    fn original(&self, mesh: Mesh, border: Border, moved: f64, node: &CoarseNode) -> NodeSurface {
+    /// A chunk of the original, with its stitches, as what a node is simplified from; errors are
+    /// measured to the original alone.
+    fn original(
+        &self,
+        mut mesh: Mesh,
+        border: Border,
+        mut stitches: Vec<[u32; 3]>,
+        moved: f64,
+        node: &CoarseNode,
+    ) -> NodeSurface {
+        let constants = self.options.constants.measure;
+        let of_mesh = || Arc::new(Original::of(&source_of(&mesh, &stitches), constants));
+        let original = self.stages.time(Stage::Measure, of_mesh);
+        mesh.triangles.append(&mut stitches);
         let spans = match self.options.borders {
             BorderMode::Skirts => original_spans(&mesh, &border, node.path),
             BorderMode::Locked | BorderMode::Shared => Vec::new(),
         };
-        let constants = self.options.constants.measure;
-        let of_mesh = || Arc::new(Original::of(&mesh, constants));
-        let original = self.stages.time(Stage::Measure, of_mesh);
         let error = SurfaceError::default().plus(moved);
         NodeSurface { mesh, border, spans, original, moved, error, baked: false }
     }
+}
+
+/// The triangles of the source alone, with the vertices that they use.
+fn source_of<'a>(mesh: &'a Mesh, stitches: &[[u32; 3]]) -> Cow<'a, Mesh> {
+    if stitches.is_empty() {
+        return Cow::Borrowed(mesh);
+    }
+    let (triangles, used) = renumber(&mesh.triangles, mesh.positions.len());
+    Cow::Owned(mesh.with_vertices(&used, triangles))
 }
 
 /// The children of a node as one surface; `planes` are those of the node's own path.
