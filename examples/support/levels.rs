@@ -57,7 +57,7 @@ pub fn upload(scene: &Scene, out: &Path, front: &[u32], renderer: &mut Renderer)
     let begin = Instant::now();
     renderer.finish_uploads()?;
     uploading += begin.elapsed();
-    println!("{decoding:.1?} to read and decode, {uploading:.1?} to upload");
+    eprintln!("{decoding:.1?} to read and decode, {uploading:.1?} to upload");
     if renderer.gpu_bytes() != foretold {
         return Err(format!("{foretold} bytes foretold, {} taken", renderer.gpu_bytes()).into());
     }

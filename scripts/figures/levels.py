@@ -4,17 +4,19 @@ import json
 import shutil
 import subprocess
 
-from common import DOCS, Options, Programs, real_data, run, say, write_between_markers
+from common import DOCS, Options, Programs, real_data, run, say, table, write_between_markers
 
 # Folder of the real data and where to look at it from, if not from above its south.
 SETS = {
     "sceaux": ["--fov", "28"],
     "oblique_a": ["--fov", "36"],
+    "oblique_b": ["--fov", "36"],
     "ingolstadt": ["--fov", "36"],
     "torcs_street1": ["--fov", "40"],
     "hamada": ["--fov", "36"],
     "wageningen": ["--fov", "36"],
     "lyon_roads": ["--fov", "36"],
+    "lyon_houses": ["--fov", "36"],
     "3dfier": ["--fov", "36"],
 }
 SIZE = "480x360"
@@ -25,7 +27,8 @@ def main():
     options = Options("levels", __doc__)
     options.add_argument("--sets", nargs="+", choices=SETS, default=list(SETS), help="[all]")
     arguments = options.parse()
-    programs = Programs(examples=["render_scene", "tile_pictures"], features=True)
+    examples = ["level_views", "render_scene", "tile_pictures"]
+    programs = Programs(examples=examples, features=True)
     for name in arguments.sets:
         if models := real_data(name):
             say(name)
@@ -44,7 +47,9 @@ def section(programs, name, models, write):
     done = subprocess.run(command, stdout=subprocess.PIPE)
     if done.returncode not in (0, 3):
         raise SystemExit(f"exit code {done.returncode} from {' '.join(command)}")
-    level = json.loads(done.stdout)["levels"][0]
+    levels = json.loads(done.stdout)["levels"]
+    views = subprocess.check_output([programs.path("examples/level_views"), str(out)])
+    views = json.loads(views)["levels"]
     folder = DOCS / "levels" if write else programs.work
     folder.mkdir(exist_ok=True)
     pictures = [programs.work / f"levels-{side}.png" for side in ("coarse", "source")]
@@ -54,18 +59,35 @@ def section(programs, name, models, write):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     run([programs.path("examples/tile_pictures"), str(folder / f"{name}.jpg"), *map(str, pictures)])
     shutil.rmtree(out)
-    return f"{caption(report, level)}\n\n![{name}: level 0 and the source](levels/{name}.jpg)\n"
+    rows = [row(*level) for level in zip(levels, views)]
+    picture = f"![{name}: level 0 and the source](levels/{name}.jpg)"
+    return f"{caption(report)}\n\n{table(HEAD, rows)}\n{picture}\n"
 
 
-def caption(report, level):
+HEAD = ["level", "triangles", "RMS, e-4", "largest, m", "ground", "skyline", "colour", "near", "far"]
+
+
+def row(level, views):
+    distance, kept = level["two_sided"], level["kept"]
+    percent = lambda share: "–" if share is None else f"{share:.1%}"
+    color = level["color_rms"]
+    return [
+        f"{level['level']}",
+        f"{level['triangles']:,}",
+        f"{distance['rms_relative']:.1f}",
+        f"{distance['max']:.3g}",
+        percent(kept["area"]),
+        percent(kept["skyline"]),
+        "–" if color is None else f"{color:.1f}",
+        f"{views['near']:.4f}",
+        f"{views['far']:.4f}",
+    ]
+
+
+def caption(report):
     source = report["source_triangles"]
     nodes = report["levels"][0]["nodes"]
-    parts = [
-        f"{level['triangles']:,} of {source:,} triangles in {nodes} nodes",
-        f"RMS distance {level['two_sided']['rms_relative']:.1f}e-4 of the diagonal",
-    ]
-    if level["color_rms"] is not None:
-        parts.append(f"colours off by {level['color_rms']:.1f} of 255 (RMS)")
+    parts = [f"{source:,} triangles, {nodes} nodes on level 0"]
     if report["source_texels"]:
         texels = sum(level["texels"] for level in report["levels"])
         parts.append(f"texels of all levels {texels / report['source_texels']:.2f} times the source's")

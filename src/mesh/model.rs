@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use glam::DVec3;
+
 use super::{Material, TextureSource};
 
 /// Which input axis points at the sky.
@@ -12,6 +14,24 @@ pub enum UpAxis {
     Y,
     /// Surveying's convention, and that of most city OBJ files.
     Z,
+}
+
+impl UpAxis {
+    /// A point or direction of a source whose up axis this is, turned so that Z is up.
+    pub fn z_up(self, p: DVec3) -> DVec3 {
+        match self {
+            Self::Z => p,
+            Self::Y => DVec3::new(p.x, -p.z, p.y),
+        }
+    }
+
+    /// The way back from [`Self::z_up`].
+    pub fn from_z_up(self, p: DVec3) -> DVec3 {
+        match self {
+            Self::Z => p,
+            Self::Y => DVec3::new(p.x, p.z, -p.y),
+        }
+    }
 }
 
 /// A named group (`g` or `o` of OBJ, node or mesh of glTF).

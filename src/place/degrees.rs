@@ -36,11 +36,7 @@ impl Degrees {
     pub fn localise(&self, model: &mut Model, up: UpAxis) -> Result<()> {
         for part in &mut model.parts {
             for position in &mut part.positions {
-                let [x, y, z] = *position;
-                let point = match up {
-                    UpAxis::Z => DVec3::new(x, y, z),
-                    UpAxis::Y => DVec3::new(x, -z, y),
-                };
+                let point = up.z_up(DVec3::from(*position));
                 let local = self.to_local(point).filter(|local| local.is_finite());
                 let near = local.filter(|local| local.abs().max_element() <= FARTHEST);
                 let Some(near) = near else {
@@ -60,10 +56,7 @@ impl Degrees {
                         ),
                     ));
                 };
-                *position = match up {
-                    UpAxis::Z => near.to_array(),
-                    UpAxis::Y => [near.x, near.z, -near.y],
-                };
+                *position = up.from_z_up(near).to_array();
             }
         }
         Ok(())

@@ -189,8 +189,6 @@ pub fn corners(low: DVec3, high: DVec3) -> [DVec3; 8] {
 
 /// A box in source axes as a box with Z up, as tiles have it.
 pub fn z_up(up: UpAxis, low: [f64; 3], high: [f64; 3]) -> (DVec3, DVec3) {
-    match up {
-        UpAxis::Z => (low.into(), high.into()),
-        UpAxis::Y => (DVec3::new(low[0], -high[2], low[1]), DVec3::new(high[0], -low[2], high[1])),
-    }
+    let [a, b] = [low, high].map(|corner| up.z_up(corner.into()));
+    (a.min(b), a.max(b))
 }

@@ -33,6 +33,7 @@ mod node_errors;
 mod node_textures;
 mod options;
 mod other_sources;
+mod outline;
 mod points;
 mod progress;
 mod report;
@@ -43,7 +44,6 @@ mod source_colors;
 mod step;
 mod structure;
 mod surface_appearance;
-
 mod text;
 mod tiles;
 mod tree;
@@ -55,8 +55,8 @@ use glam::DVec3;
 pub use options::{Limits, VerifyOptions};
 pub use progress::{Progress, Silent};
 pub use report::{
-    Check, Distance, ErrorFigures, Failure, GapFigures, LeafFigures, LevelFigures, NodeFigures,
-    SceneFacts, TileFigures, VerifyReport,
+    Check, Distance, ErrorFigures, Failure, GapFigures, Kept, LeafFigures, LevelFigures,
+    NodeFigures, SceneFacts, TileFigures, VerifyReport,
 };
 pub use text::text;
 
@@ -258,6 +258,15 @@ impl Verification<'_> {
         };
         let diagonal = report.scene.as_ref().map_or(0.0, |facts| facts.diagonal);
         let mut all: Vec<NodeDistances> = Vec::new();
+        let frame = outline::Frame::around(scene.up, leaves, geometry);
+        let outline = frame.as_ref().map(|frame| frame.outline(leaves, geometry));
+        let kept = |front: &Front| match (&frame, &outline) {
+            (Some(frame), Some(outline)) => {
+                let nodes: Vec<u32> = front.nodes().collect();
+                outline.kept_by(&frame.outline(&nodes, geometry))
+            }
+            _ => Kept::default(),
+        };
         let measure = |front: &Front, level: Option<u32>| {
             let seed = options.seed;
             let distances =
@@ -273,7 +282,7 @@ impl Verification<'_> {
                 || {},
             );
             let figures = self.level_figures(front, level, geometry, &distances, diagonal);
-            (LevelFigures { color_rms, tiles, ..figures }, distances.nodes)
+            (LevelFigures { kept: kept(front), color_rms, tiles, ..figures }, distances.nodes)
         };
         for level in 0..tree::coarse_levels(scene) {
             progress.phase(&format!("level {level}"), leaves.len() as u64);

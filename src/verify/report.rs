@@ -172,10 +172,28 @@ pub struct LevelFigures {
     pub to_source: Distance,
     /// The larger of both.
     pub two_sided: Distance,
+    /// What it keeps of the outline of the leaves.
+    pub kept: Kept,
     /// RMS colour difference, sRGB 0–255; `None` where nothing could be compared.
     pub color_rms: Option<f64>,
     /// Tiles of generated cities; `None` elsewhere.
     pub tiles: Option<TileFigures>,
+}
+
+/// What a front keeps of the ground that the source covers, seen from above, and of its skylines,
+/// seen from sixteen sides: shares of the source, 0–1, by a grid of 4,096 cells along the longer
+/// side and skylines of 4,096 columns. `None` where the source covers nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Kept {
+    /// Of the covered ground, what is covered still.
+    pub area: Option<f64>,
+    /// What is covered besides, over the area of the source; may exceed 1.
+    pub area_added: Option<f64>,
+    /// Of the area between each column's lowest point and the skyline, what is below the front's
+    /// skyline still.
+    pub skyline: Option<f64>,
+    /// How far the front's skyline is above the source's, over the same area; may exceed 1.
+    pub skyline_added: Option<f64>,
 }
 
 /// How many samples show the right tile.

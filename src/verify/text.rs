@@ -33,8 +33,9 @@ pub fn text(report: &VerifyReport) -> String {
     }
     if !report.levels.is_empty() {
         line(format!(
-            "\nDistance of each level, with the leaves above it, to the source, two-sided, in metres and in 1e-4 of the diagonal; colour RMS of 255\n\
-             {:>5} {:>7} {:>7} {:>10} {:>9} {:>7} {:>9} {:>7} {:>9} {:>7} {:>7} {:>12}",
+            "\nDistance of each level, with the leaves above it, to the source, two-sided, in metres and in 1e-4 of the diagonal; \
+             ground covered and skylines kept; colour RMS of 255\n\
+             {:>5} {:>7} {:>7} {:>10} {:>9} {:>7} {:>9} {:>7} {:>9} {:>7} {:>7} {:>7} {:>7} {:>12}",
             "level",
             "nodes",
             "leaves",
@@ -45,6 +46,8 @@ pub fn text(report: &VerifyReport) -> String {
             "e-4",
             "max m",
             "e-4",
+            "area %",
+            "skyl. %",
             "colour",
             "wrong tiles"
         ));
@@ -61,7 +64,7 @@ pub fn text(report: &VerifyReport) -> String {
                 _ => "too coarse".into(),
             });
             line(format!(
-                "{:>5} {:>7} {:>7} {:>10} {:>9.4} {:>7.3} {:>9.4} {:>7.3} {:>9.4} {:>7.2} {:>7} {:>12}",
+                "{:>5} {:>7} {:>7} {:>10} {:>9.4} {:>7.3} {:>9.4} {:>7.3} {:>9.4} {:>7.2} {:>7} {:>7} {:>7} {:>12}",
                 name,
                 level.nodes,
                 level.leaves_above,
@@ -72,6 +75,8 @@ pub fn text(report: &VerifyReport) -> String {
                 rms_relative,
                 max,
                 max_relative,
+                percent(level.kept.area),
+                percent(level.kept.skyline),
                 color,
                 tiles
             ));
@@ -133,4 +138,8 @@ fn failures(check: &Check, line: &mut impl FnMut(String)) {
 
 fn verdict(passed: bool) -> &'static str {
     if passed { "pass" } else { "FAIL" }
+}
+/// A share in percent, as tables have it.
+fn percent(share: Option<f64>) -> String {
+    share.map_or("-".into(), |share| format!("{:.1}", share * 100.0))
 }

@@ -20,10 +20,7 @@ impl Plan {
 
     /// A direction of the source on the map.
     fn turn(&self, vector: DVec3) -> DVec3 {
-        match self.up {
-            UpAxis::Z => vector,
-            UpAxis::Y => DVec3::new(vector.x, -vector.z, vector.y),
-        }
+        self.up.z_up(vector)
     }
 
     /// A point of the source on the map.
@@ -39,11 +36,7 @@ impl Plan {
 
     /// A point of the map in the source.
     pub(super) fn source(&self, point: DVec3) -> DVec3 {
-        let turned = match self.up {
-            UpAxis::Z => point,
-            UpAxis::Y => DVec3::new(point.x, point.z, -point.y),
-        };
-        self.origin + turned
+        self.origin + self.up.from_z_up(point)
     }
 
     /// Which axis of the source is the map's height.

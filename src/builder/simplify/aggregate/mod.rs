@@ -10,12 +10,10 @@
 //! body (the ground, roads, fences) stay as they are.
 
 mod bodies;
-mod frame;
 mod joining;
 mod solid;
 
 use self::bodies::{Part, parts};
-use self::frame::Frame;
 use self::joining::join_down_to;
 use self::solid::Solid;
 use crate::builder::constants::BoxConstants;
@@ -42,7 +40,6 @@ pub fn aggregate(
     if !mesh.texcoords.is_empty() {
         return None;
     }
-    let frame = Frame::of(up);
     let parts = parts(mesh);
     if parts.len() * constants.triangles_per_body <= target {
         return None;
@@ -53,7 +50,7 @@ pub fn aggregate(
     for part in parts {
         let is_free = || !part.triangles.iter().flatten().any(|&vertex| locked[vertex as usize]);
         let solid = (share(part.area) < constants.enough_triangles && is_free())
-            .then(|| Solid::of(mesh, &part.triangles, frame, constants))
+            .then(|| Solid::of(mesh, &part.triangles, up, constants))
             .flatten();
         match solid {
             Some(solid) => {
@@ -74,7 +71,7 @@ pub fn aggregate(
     join_down_to(&mut solids, most.max(1), constants);
     let mut boxes = Mesh::default();
     for solid in &solids {
-        solid.add_to(&mut boxes, mesh, frame);
+        solid.add_to(&mut boxes, mesh, up);
     }
     Some(Aggregated { boxes, rest })
 }

@@ -2,9 +2,8 @@
 
 use glam::{DVec2, dvec2};
 
-use super::frame::Frame;
 use crate::builder::constants::BoxConstants;
-use crate::mesh::{Mesh, wide};
+use crate::mesh::{Mesh, UpAxis, wide};
 
 /// Of one box, without a floor, which nobody sees.
 pub(super) const TRIANGLES: usize = 10;
@@ -84,10 +83,10 @@ impl Solid {
     pub(super) fn of(
         mesh: &Mesh,
         triangles: &[[u32; 3]],
-        frame: Frame,
+        up: UpAxis,
         constants: &BoxConstants,
     ) -> Option<Self> {
-        let at = |vertex: u32| frame.upright(wide(mesh.positions[vertex as usize]));
+        let at = |vertex: u32| up.z_up(wide(mesh.positions[vertex as usize]));
         let mut sums = Sums::default();
         for &triangle in triangles {
             let [a, b, c] = triangle.map(at);
@@ -174,9 +173,9 @@ impl Solid {
     }
 
     /// Appends the box to `boxes`, looking as `mesh` does.
-    pub(super) fn add_to(&self, boxes: &mut Mesh, mesh: &Mesh, frame: Frame) {
+    pub(super) fn add_to(&self, boxes: &mut Mesh, mesh: &Mesh, up: UpAxis) {
         let mut add = |corner: DVec2, height: f64, look: &Look| {
-            let place = frame.back(corner.extend(height));
+            let place = up.from_z_up(corner.extend(height));
             boxes.positions.push(place.as_vec3().to_array());
             boxes.materials.push(mesh.materials[look.vertex as usize]);
             if !mesh.colors.is_empty() {
@@ -248,17 +247,15 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::mesh::UpAxis;
 
     /// A house of 8 by 4 m and 3 m high, turned by about 30 degrees.
     fn house(up: UpAxis) -> Mesh {
         let axis = dvec2(0.75f64.sqrt(), 0.5);
-        let frame = Frame::of(up);
         let corners = [[0.0, 0.0], [8.0, 0.0], [8.0, 4.0], [0.0, 4.0]];
         let places = [1.0, 4.0].into_iter().flat_map(|height| {
             corners.map(|[x, y]| {
                 let place = dvec2(50.0, 20.0) + axis * x + axis.perp() * y;
-                frame.back(place.extend(height)).as_vec3().to_array()
+                up.from_z_up(place.extend(height)).as_vec3().to_array()
             })
         });
         let mut triangles = vec![[4, 5, 6], [4, 6, 7], [0, 2, 1], [0, 3, 2]];
@@ -273,20 +270,18 @@ mod tests {
     fn the_box_of_a_box_is_itself_whichever_axis_is_up() {
         for up in [UpAxis::Z, UpAxis::Y] {
             let house = house(up);
-            let solid =
-                Solid::of(&house, &house.triangles, Frame::of(up), &BoxConstants::default())
-                    .unwrap();
+            let solid = Solid::of(&house, &house.triangles, up, &BoxConstants::default()).unwrap();
             assert!((solid.footprint - 32.0).abs() < 1e-3, "{}", solid.footprint);
             assert!((solid.low - 1.0).abs() < 1e-5 && (solid.high - 4.0).abs() < 1e-5);
             let mut boxes = Mesh::default();
-            solid.add_to(&mut boxes, &house, Frame::of(up));
+            solid.add_to(&mut boxes, &house, up);
             assert_eq!(boxes.triangles.len(), TRIANGLES);
             // All but the floor, facing outwards.
             assert!((boxes.area() - (house.area() - 32.0)).abs() < 1e-2, "{}", boxes.area());
             let volume = |mesh: &Mesh| -> f64 {
                 let six = |&t: &[u32; 3]| {
                     let [a, b, c] = mesh.corners(t);
-                    let down = Frame::of(up).back(DVec3::Z);
+                    let down = up.from_z_up(DVec3::Z);
                     (a - down).dot((b - down).cross(c - down))
                 };
                 mesh.triangles.iter().map(six).sum::<f64>() / 6.0
@@ -303,13 +298,13 @@ mod tests {
     #[test]
     fn what_is_flat_or_has_no_roof_is_no_body() {
         let house = house(UpAxis::Z);
-        let frame = Frame::of(UpAxis::Z);
+        let up = UpAxis::Z;
         assert!(
-            Solid::of(&house, &house.triangles[..2], frame, &BoxConstants::default()).is_none(),
+            Solid::of(&house, &house.triangles[..2], up, &BoxConstants::default()).is_none(),
             "a roof alone"
         );
         assert!(
-            Solid::of(&house, &house.triangles[4..], frame, &BoxConstants::default()).is_none(),
+            Solid::of(&house, &house.triangles[4..], up, &BoxConstants::default()).is_none(),
             "walls alone"
         );
         let mut slope = house.clone();
@@ -317,7 +312,7 @@ mod tests {
             place[2] = place[0] * 0.4;
         }
         assert!(
-            Solid::of(&slope, &slope.triangles[..2], frame, &BoxConstants::default()).is_none(),
+            Solid::of(&slope, &slope.triangles[..2], up, &BoxConstants::default()).is_none(),
             "a slope"
         );
         let mut ramp = house;
@@ -325,7 +320,7 @@ mod tests {
             place[2] = place[2] * 0.1 + place[0] * 0.4;
         }
         assert!(
-            Solid::of(&ramp, &ramp.triangles, frame, &BoxConstants::default()).is_none(),
+            Solid::of(&ramp, &ramp.triangles, up, &BoxConstants::default()).is_none(),
             "a ramp"
         );
     }
@@ -333,8 +328,7 @@ mod tests {
     #[test]
     fn joined_boxes_keep_their_volume_and_base() {
         let house = house(UpAxis::Z);
-        let a = Solid::of(&house, &house.triangles, Frame::of(UpAxis::Z), &BoxConstants::default())
-            .unwrap();
+        let a = Solid::of(&house, &house.triangles, UpAxis::Z, &BoxConstants::default()).unwrap();
         let b = Solid {
             centre: a.centre + dvec2(12.0, 3.0),
             low: a.low + 1.0,
