@@ -1,5 +1,6 @@
 //! Separate houses in one group, which planes would run through by the hundred.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -8,6 +9,7 @@ use hlod::verify::{Silent, VerifyOptions, verify};
 use tempfile::TempDir;
 
 use crate::support::inputs::write;
+use crate::support::result::Built;
 use crate::support::{Random, run_build};
 
 /// A town without groups: 1,500 closed shells with gables, of 16 triangles, at odd angles; each of
@@ -81,4 +83,48 @@ fn a_half_that_goes_leaves_the_other_half_closed() {
     let open = report.gaps.iter().map(|gap| gap.open).fold(0.0, f64::max);
     let without_skirts = report.gaps.iter().map(|gap| gap.bare).fold(0.0, f64::max);
     assert!(open < 1e-3 && without_skirts > 1.0, "{open} {without_skirts}");
+}
+
+/// The same with red roofs and white walls, each of a plain material.
+fn painted(folder: &Path) {
+    town(folder, 5);
+    let text = std::fs::read_to_string(folder.join("town.obj")).unwrap();
+    let mut lines = vec!["mtllib town.mtl".to_owned()];
+    let mut face = 0;
+    for line in text.lines() {
+        if line.starts_with('f') {
+            let material = if face % 7 < 5 { "wall" } else { "roof" };
+            lines.push(format!("usemtl {material}"));
+            face += 1;
+        }
+        lines.push(line.to_owned());
+    }
+    write(folder, "town.obj", lines.join("\n"));
+    write(folder, "town.mtl", "newmtl wall\nKd 0.9 0.9 0.9\nnewmtl roof\nKd 0.7 0.2 0.1\n");
+}
+
+#[test]
+fn no_triangle_goes_from_one_material_to_another() {
+    let folder = tempfile::tempdir().unwrap();
+    painted(folder.path());
+    run_build(folder.path(), &["--quiet", "--desired-tris", "300", "town.obj", "out"]);
+    let built = Built::read(&folder.path().join("out"));
+    let colors = |node: usize| -> BTreeSet<BTreeSet<[u16; 4]>> {
+        let of_primitive = |primitive: &hlod::format::Primitive| {
+            let corners = primitive.indices.as_chunks::<3>().0.iter();
+            let look = |t: &[u32; 3]| t.iter().map(|&v| primitive.colors[v as usize]).collect();
+            corners.map(look).collect::<Vec<BTreeSet<[u16; 4]>>>()
+        };
+        built.meshes[node].primitives.iter().flat_map(of_primitive).collect()
+    };
+    let leaf = (0..built.meshes.len()).find(|&node| built.is_leaf(node)).unwrap();
+    let palette = colors(leaf);
+    assert_eq!(palette.len(), 2, "{palette:?}");
+    let coarse: Vec<usize> = (0..built.meshes.len()).filter(|&node| !built.is_leaf(node)).collect();
+    assert!(coarse.len() > 20);
+    for node in coarse {
+        let found = colors(node);
+        assert!(found.is_subset(&palette), "node {node}: {found:?}");
+        assert_eq!(found.len(), 2, "node {node} has roofs and walls");
+    }
 }

@@ -10,6 +10,7 @@ mod adjacency;
 mod bvh;
 mod directed;
 mod mean;
+mod nearest;
 mod original;
 mod overlay;
 mod polygon;
@@ -20,8 +21,9 @@ mod triangle;
 pub use self::directed::TIGHTNESS;
 use self::directed::{Directed, Largest, seed};
 pub use self::mean::MeanDistance;
-pub use self::original::Original;
+pub use self::nearest::NearestTriangle;
 use self::original::Search;
+pub use self::original::{Face, Original};
 use crate::mesh::Mesh;
 
 /// How far two surfaces are apart, metres, both ways.

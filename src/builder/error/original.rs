@@ -35,6 +35,43 @@ pub(super) struct Part {
     pub bvh: Bvh,
     pub samples: Samples,
     pub adjacency: Adjacency,
+    /// What each triangle looks like, where no triangle has corners of several colours; by slot.
+    pub faces: Vec<Face>,
+}
+
+/// What a triangle of one colour looks like.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Face {
+    /// The number of its material in the block's model.
+    pub material: u32,
+    /// RGBA, linear, 65535 is 1.
+    pub color: [u16; 4],
+}
+
+impl Face {
+    /// Of a triangle with vertex colours; `None` where its corners differ.
+    pub fn of(mesh: &Mesh, triangle: [u32; 3]) -> Option<Self> {
+        let [a, b, c] = triangle.map(|vertex| mesh.colors[vertex as usize]);
+        let material = mesh.materials[triangle[0] as usize];
+        (a == b && b == c).then_some(Self { material, color: a })
+    }
+}
+
+/// By slot; empty where there are no vertex colours, or a triangle has several.
+fn faces(mesh: &Mesh, leaves: &[Vec<u32>]) -> Vec<Face> {
+    if mesh.colors.is_empty() {
+        return Vec::new();
+    }
+    let mut faces = vec![Face::default(); leaves.len() * LANES];
+    for (leaf, members) in leaves.iter().enumerate() {
+        for (lane, &member) in members.iter().enumerate() {
+            let Some(face) = Face::of(mesh, mesh.triangles[member as usize]) else {
+                return Vec::new();
+            };
+            faces[leaf * LANES + lane] = face;
+        }
+    }
+    faces
 }
 
 /// A triangle of an [`Original`].
@@ -64,7 +101,8 @@ impl Original {
         let (bvh, leaves) = Bvh::new(mesh);
         let adjacency = Adjacency::new(mesh, &leaves);
         let samples = Samples::of(&bvh, &constants);
-        Self::from_parts(vec![Arc::new(Part { bvh, samples, adjacency })], constants)
+        let faces = faces(mesh, &leaves);
+        Self::from_parts(vec![Arc::new(Part { bvh, samples, adjacency, faces })], constants)
     }
 
     /// The surface of one mesh, of which nothing is asked but what is near points.
@@ -72,10 +110,29 @@ impl Original {
         if mesh.triangles.is_empty() {
             return Self::from_parts(Vec::new(), constants);
         }
-        let (bvh, _) = Bvh::new(mesh);
+        Self::of_bvh(Bvh::new(mesh).0, constants)
+    }
+
+    pub(super) fn of_bvh(bvh: Bvh, constants: MeasureConstants) -> Self {
         let samples = Samples::of(&bvh, &constants);
-        let adjacency = Adjacency::default();
-        Self::from_parts(vec![Arc::new(Part { bvh, samples, adjacency })], constants)
+        let (adjacency, faces) = Default::default();
+        Self::from_parts(vec![Arc::new(Part { bvh, samples, adjacency, faces })], constants)
+    }
+
+    /// Corners, area and looks of its triangles; `None` where some have several colours, or none.
+    pub fn faces(&self) -> Option<impl Iterator<Item = ([Vec3; 3], f64, Face)>> {
+        let known = self.parts.iter().all(|part| !part.faces.is_empty());
+        let of_part = |part: &'_ Arc<Part>| {
+            let part = Arc::clone(part);
+            (0..part.bvh.leaves.len()).flat_map(move |leaf| {
+                let part = Arc::clone(&part);
+                (0..usize::from(part.bvh.counts[leaf])).map(move |lane| {
+                    let triangle = part.bvh.leaves[leaf].lane(lane);
+                    (triangle.corners(), triangle.area(), part.faces[leaf * LANES + lane])
+                })
+            })
+        };
+        (known && !self.is_empty()).then(|| self.parts.iter().flat_map(of_part))
     }
 
     /// Several surfaces as one. Their triangles are shared, not copied.
@@ -83,6 +140,15 @@ impl Original {
         let constants = parts.first().map_or_else(Default::default, |part| part.constants);
         let all = parts.iter().flat_map(|part| part.parts.iter().cloned());
         Self::from_parts(all.collect(), constants)
+    }
+
+    /// What the triangle nearest to a point looks like; `None` where [`Self::faces`] has none.
+    pub fn face_near(&self, point: Vec3) -> Option<Face> {
+        if self.is_empty() {
+            return None;
+        }
+        let id = Search::new(self).nearest(point, 0.0).id;
+        self.parts[id.part as usize].faces.get(id.slot() as usize).copied()
     }
 
     fn from_parts(parts: Vec<Arc<Part>>, constants: MeasureConstants) -> Self {

@@ -13,6 +13,7 @@ use crate::builder::border::thin::thin_border;
 use crate::builder::border::vertex::{Border, Path};
 use crate::builder::error::{Original, SurfaceError, surface_error};
 use crate::builder::simplify::compact::compact;
+use crate::builder::simplify::face_colors::with_face_colors;
 use crate::builder::simplify::fallback::fallback_triangles;
 use crate::builder::simplify::ladder::{AppearanceWeights, Method, simplify};
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
@@ -73,9 +74,16 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             self.stages.time(Stage::Measure, || surface_error(&original, &mesh)).plus(moved);
         let error = measured.at_least(&below);
         let on_border = |&&planes: &&u64| planes & node.path.bits() != 0;
+        // Of what is written alone: parents take their colours from the original, too.
+        let painted =
+            self.stages.time(Stage::Simplify, || with_face_colors(&mesh, &skirts, &original));
+        let (drawn, skirts) = match &painted {
+            Some((painted, skirts)) => (painted, skirts),
+            None => (&mesh, &skirts),
+        };
         let record = self.sink.take(&NodeDraft {
-            mesh: &mesh,
-            skirts: &skirts,
+            mesh: drawn,
+            skirts,
             resolution: node.resolution,
             child_path: node.child_path,
             budget: node.budget,

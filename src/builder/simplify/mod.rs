@@ -5,6 +5,7 @@ pub mod cluster;
 pub mod collapse;
 pub mod compact;
 mod connected;
+pub mod face_colors;
 pub mod fallback;
 pub mod ladder;
 pub mod merge;

@@ -1,0 +1,211 @@
+//! Colours of coarse triangles, where colours belong to faces.
+//!
+//! Plain materials are no property of vertices: collapsed with these, a roof's red runs down the
+//! walls. A coarse triangle gets the one colour that covers most of what it stands for: each point
+//! of the original votes for the triangle that is nearest to it.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+use rustc_hash::FxHashMap;
+
+use crate::builder::border::skirt::Skirt;
+use crate::builder::error::{Face, NearestTriangle, Original};
+use crate::mesh::Mesh;
+
+/// Points of the original that vote, for each coarse triangle, about.
+const POINTS: f64 = 32.0;
+
+/// A mesh whose triangles have each the colour of most of the original that is nearest to them, and
+/// its skirts; `None` where the original's colours are not those of faces.
+pub fn with_face_colors(
+    mesh: &Mesh,
+    skirts: &[Skirt],
+    original: &Original,
+) -> Option<(Mesh, Vec<Skirt>)> {
+    let votes = votes(mesh, original)?;
+    let mut painted = mesh.clone();
+    // The first triangle of a vertex paints it; others get copies.
+    let mut colored: Vec<Option<[u16; 4]>> = vec![None; mesh.positions.len()];
+    let mut copies: FxHashMap<(u32, [u16; 4]), u32> = FxHashMap::default();
+    let mut edges: FxHashMap<[u32; 2], [u32; 2]> = FxHashMap::default();
+    for (number, votes) in votes.iter().enumerate() {
+        let corners = mesh.triangles[number];
+        let material = mesh.materials[corners[0] as usize];
+        let fitting = votes.iter().filter(|(face, _)| face.material == material);
+        let most = fitting.max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)));
+        // What is nearest to nothing looks like what is nearest to it.
+        let nearest = || {
+            let sum: Vec3 = corners.iter().map(|&v| Vec3::from(mesh.positions[v as usize])).sum();
+            original.face_near(sum / 3.0).filter(|face| face.material == material)
+        };
+        let color = match most.map(|(face, _)| *face).or_else(nearest) {
+            Some(face) => face.color,
+            None => mesh.colors[corners[0] as usize],
+        };
+        let new = corners.map(|vertex| {
+            let own = &mut colored[vertex as usize];
+            if *own.get_or_insert(color) == color {
+                painted.colors[vertex as usize] = color;
+                return vertex;
+            }
+            *copies.entry((vertex, color)).or_insert_with(|| {
+                let copy = painted.push_copy(vertex as usize);
+                painted.colors[copy as usize] = color;
+                copy
+            })
+        });
+        for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+            edges.insert([corners[from], corners[to]], [new[from], new[to]]);
+        }
+        painted.triangles[number] = new;
+    }
+    let of_edge = |skirt: &Skirt| {
+        let [a, b] = skirt.edge;
+        let back = || edges.get(&[b, a]).map(|&[b, a]| [a, b]);
+        let edge = edges.get(&[a, b]).copied().or_else(back).unwrap_or([a, b]);
+        Skirt { edge, ..skirt.clone() }
+    };
+    Some((painted, skirts.iter().map(of_edge).collect()))
+}
+
+/// By triangle, the area of the original of each look that is nearest to it.
+fn votes(mesh: &Mesh, original: &Original) -> Option<Vec<BTreeMap<Face, f64>>> {
+    if mesh.colors.is_empty() {
+        return None;
+    }
+    let nearest = NearestTriangle::of(mesh)?;
+    let mut nearest = nearest.search();
+    let mut votes = vec![BTreeMap::new(); mesh.triangles.len()];
+    let (_, _, first) = original.faces()?.next()?;
+    if original.faces()?.all(|(_, _, face)| face.color == first.color) {
+        return None;
+    }
+    let area: f64 = original.faces()?.map(|(_, area, _)| area).sum();
+    let share = area / (POINTS * mesh.triangles.len() as f64);
+    for (corners, area, face) in original.faces()? {
+        let side = ((area / share).sqrt().ceil() as usize).clamp(1, 64);
+        for point in points(corners, side) {
+            let triangle = nearest(point);
+            *votes[triangle as usize].entry(face).or_insert(0.0) += area / (side * side) as f64;
+        }
+    }
+    Some(votes)
+}
+
+/// The centres of the triangles into which one is divided, `side` along each edge.
+fn points([a, b, c]: [Vec3; 3], side: usize) -> impl Iterator<Item = Vec3> {
+    let at = move |u: f32, v: f32| a + (b - a) * (u / side as f32) + (c - a) * (v / side as f32);
+    (0..side).flat_map(move |row| {
+        (0..2 * (side - row) - 1).map(move |place| {
+            let third = if place % 2 == 0 { 1.0 / 3.0 } else { 2.0 / 3.0 };
+            at((place / 2) as f32 + third, row as f32 + third)
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::constants::MeasureConstants;
+
+    const RED: [u16; 4] = [60_000, 5_000, 5_000, u16::MAX];
+    const WHITE: [u16; 4] = [u16::MAX; 4];
+
+    /// A sheet of squares over [0, 10]², each with vertices of its own of one colour.
+    fn sheet(squares: u16, color: impl Fn(f32) -> [u16; 4]) -> Mesh {
+        let mut mesh = Mesh::default();
+        let side = 10.0 / f32::from(squares);
+        for (x, y) in (0..squares).flat_map(|y| (0..squares).map(move |x| (x, y))) {
+            let first = mesh.positions.len() as u32;
+            let at = |dx: u16, dy: u16| [f32::from(x + dx) * side, f32::from(y + dy) * side, 0.0];
+            mesh.positions.extend([at(0, 0), at(1, 0), at(1, 1), at(0, 1)]);
+            mesh.colors.extend([color((f32::from(x) + 0.5) * side); 4]);
+            mesh.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|v| first + v)));
+        }
+        mesh.materials = vec![0; mesh.positions.len()];
+        mesh
+    }
+
+    /// Two triangles and a narrow one beside them, of shared vertices and no sensible colours.
+    fn coarse() -> Mesh {
+        let positions: Vec<[f32; 3]> =
+            [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0], [-0.1, 5.0]]
+                .map(|[x, y]| [x, y, 0.1])
+                .to_vec();
+        Mesh {
+            colors: (0..positions.len() as u16).map(|n| [n, 77, 99, u16::MAX]).collect(),
+            materials: vec![0; positions.len()],
+            triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 4]],
+            positions,
+            texcoords: Vec::new(),
+        }
+    }
+
+    fn original(mesh: &Mesh) -> Original {
+        Original::of(mesh, MeasureConstants::default())
+    }
+
+    fn looks(mesh: &Mesh) -> Vec<Option<[u16; 4]>> {
+        mesh.triangles.iter().map(|&t| Face::of(mesh, t).map(|face| face.color)).collect()
+    }
+
+    #[test]
+    fn a_triangle_has_the_colour_of_most_of_what_is_nearest_to_it() {
+        // Red to x = 6: two thirds of the left triangle and a third of the right one.
+        let source = sheet(20, |x| if x < 6.0 { RED } else { WHITE });
+        let skirt = |edge| Skirt { edge, corners: vec![([0.0; 3], 0)], triangles: vec![[0, 1, 2]] };
+        let (painted, skirts) =
+            with_face_colors(&coarse(), &[skirt([1, 2]), skirt([2, 3])], &original(&source))
+                .unwrap();
+        assert_eq!(looks(&painted), [Some(WHITE), Some(RED), Some(RED)]);
+        // No place moved: copies of the two vertices on the border of both colours.
+        assert_eq!(painted.positions.len(), 7);
+        for (new, old) in painted.triangles.iter().zip(coarse().triangles) {
+            let places = |mesh: &Mesh, t: [u32; 3]| t.map(|v| mesh.positions[v as usize]);
+            assert_eq!(places(&painted, *new), places(&coarse(), old));
+        }
+        // Skirts look like the triangle that they hang from.
+        let of = |skirt: &Skirt| skirt.edge.map(|vertex| painted.colors[vertex as usize]);
+        assert_eq!(skirts.iter().map(of).collect::<Vec<_>>(), [[WHITE; 2], [RED; 2]]);
+    }
+
+    #[test]
+    fn votes_are_areas_not_triangles() {
+        // As many triangles left of x = 1 as right of it.
+        let mut source = sheet(20, |_| RED);
+        for (position, color) in source.positions.iter_mut().zip(&mut source.colors) {
+            let narrow = |x: f32| if x <= 5.0 { x * 0.2 } else { 1.0 + (x - 5.0) * 1.8 };
+            position[0] = narrow(position[0]);
+            *color = WHITE;
+        }
+        for square in (0..400).filter(|square| square % 20 < 10) {
+            source.colors[square * 4..square * 4 + 4].fill(RED);
+        }
+        let (painted, _) = with_face_colors(&coarse(), &[], &original(&source)).unwrap();
+        assert_eq!(looks(&painted)[..2], [Some(WHITE); 2]);
+    }
+
+    #[test]
+    fn smooth_colours_one_colour_and_none_are_left_alone() {
+        let mut smooth = sheet(4, |_| RED);
+        smooth.colors[0] = WHITE;
+        assert!(with_face_colors(&coarse(), &[], &original(&smooth)).is_none());
+        assert!(with_face_colors(&coarse(), &[], &original(&sheet(4, |_| RED))).is_none());
+        let plain = Mesh { colors: Vec::new(), ..sheet(4, |_| RED) };
+        let uncolored = Mesh { colors: Vec::new(), ..coarse() };
+        assert!(with_face_colors(&uncolored, &[], &original(&plain)).is_none());
+    }
+
+    #[test]
+    fn points_divide_a_triangle_evenly() {
+        let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        for side in [1, 2, 5] {
+            let all: Vec<Vec3> = points(corners, side).collect();
+            assert_eq!(all.len(), side * side);
+            let middle = all.iter().sum::<Vec3>() / all.len() as f32;
+            assert!(middle.distance(Vec3::new(1.0, 1.0, 0.0) / 3.0) < 1e-5);
+            assert!(all.iter().all(|p| p.x > 0.0 && p.y > 0.0 && p.x + p.y < 1.0));
+        }
+    }
+}
