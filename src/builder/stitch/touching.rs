@@ -143,6 +143,47 @@ const SIDE_BY_SIDE: f64 = 0.85;
 /// Nor back by more, where nearest vertices are not in order.
 const MOST_BACK: usize = 4;
 
+/// Borders that touch do so for at least so many times as far as they are apart. What is shorter
+/// is a notch or the narrow end of a hole: bridged, it is simplified as if there were surface, and a
+/// tongue between two holes may go.
+const LEAST_LENGTH: f64 = 4.0;
+
+/// The stitches along one border, so far as it goes without a break.
+#[derive(Default)]
+struct Strip {
+    stitches: Vec<Stitch>,
+    /// Along the border, metres.
+    length: f64,
+    /// The farthest apex from its edge, metres.
+    width: f64,
+    end: Option<[f64; 3]>,
+}
+
+impl Strip {
+    /// Appends a stitch, if it is a triangle.
+    fn push(&mut self, stitch: Stitch) {
+        if stitch.edge.contains(&stitch.apex) {
+            return;
+        }
+        let (off, _) = nearest_on(stitch.edge.map(wide), wide(stitch.apex));
+        self.width = self.width.max(off);
+        self.stitches.push(stitch);
+    }
+
+    /// The stitches of a strip that is long enough; the next one begins.
+    fn finished(&mut self) -> Vec<Stitch> {
+        let Self { stitches, length, width, .. } = std::mem::take(self);
+        if length >= LEAST_LENGTH * width { stitches } else { Vec::new() }
+    }
+}
+
+/// The distance of a place from an edge, and how far along it the nearest point is, 0–1.
+fn nearest_on([from, to]: [DVec3; 2], place: DVec3) -> (f64, f64) {
+    let along = (place - from).dot(to - from) / (to - from).length_squared();
+    let along = along.clamp(0.0, 1.0);
+    (from.lerp(to, along).distance(place), along)
+}
+
 impl Borders {
     fn new(edges: Vec<OpenEdge>, kinds: Vec<Option<u32>>, reach: Vec<f64>) -> Self {
         let [from, to] = [0, 1].map(|end| AtPosition::new(edges.iter().map(|edge| edge.ends[end])));
@@ -276,10 +317,7 @@ impl Borders {
 
     /// The distance of a place from an edge, and how far along it the nearest point is, 0–1.
     fn distance(&self, edge: u32, place: DVec3) -> (f64, f64) {
-        let [from, to] = self.edge(edge).ends.map(wide);
-        let along = (place - from).dot(to - from) / (to - from).length_squared();
-        let along = along.clamp(0.0, 1.0);
-        (from.lerp(to, along).distance(place), along)
+        nearest_on(self.edge(edge).ends.map(wide), place)
     }
 
     /// Whether two edges are of one kind and run in opposite directions with their triangles on
@@ -306,6 +344,7 @@ impl Borders {
 
     fn strips(&self) -> Vec<Stitch> {
         let mut stitches = Vec::new();
+        let mut strip = Strip::default();
         let mut used = vec![false; self.edges.len()];
         // Where the strip along a border has come to on the other side.
         let mut reached = self.partners();
@@ -349,18 +388,22 @@ impl Borders {
             if walk.iter().any(is_far) {
                 continue;
             }
+            if strip.end != Some(a) {
+                stitches.append(&mut strip.finished());
+            }
             used[edge as usize] = true;
+            strip.end = Some(b);
+            strip.length += wide(a).distance(wide(b));
             let parts = [own.part, goal.part];
-            let first = Stitch { edge: own.ends, apex: goal.at, parts };
-            stitches.extend(Some(first).filter(|stitch| !stitch.edge.contains(&goal.at)));
+            strip.push(Stitch { edge: own.ends, apex: goal.at, parts });
             for other in walk {
                 used[other as usize] = true;
                 let other = self.edge(other);
                 let parts = [other.part, own.part];
-                let stitch = Stitch { edge: other.ends, apex: b, parts };
-                stitches.extend(Some(stitch).filter(|stitch| !stitch.edge.contains(&b)));
+                strip.push(Stitch { edge: other.ends, apex: b, parts });
             }
         }
+        stitches.append(&mut strip.finished());
         stitches
     }
 
@@ -547,6 +590,16 @@ mod tests {
             teeth.indices.extend([first, first + 1, first + 2]);
         }
         assert_eq!(between(&[teeth]), []);
+
+        // A hole that is as long as a square and half as wide.
+        let mut holed = sheet([0.0, 0.0], [5.0, 5.0], 20, 20, flat);
+        for position in &mut holed.positions {
+            if position[0] == 2.5 && [2.25, 2.5].contains(&position[1]) {
+                position[0] = 2.37;
+            }
+        }
+        holed.indices.drain(6 * (20 * 9 + 9)..6 * (20 * 9 + 10));
+        assert_eq!(between(&[holed]), []);
 
         // Long squares, narrower than what is no feature of the sheet beside them.
         let ribbon = sheet([20.0, 0.0], [20.05, 5.0], 1, 20, flat);
