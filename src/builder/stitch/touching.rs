@@ -148,7 +148,8 @@ const MOST_BACK: usize = 4;
 /// tongue between two holes may go.
 const LEAST_LENGTH: f64 = 4.0;
 
-/// The stitches along one border, so far as it goes without a break.
+/// The stitches along one border, so far as it goes without a break that is longer than such a
+/// strip at its widest.
 #[derive(Default)]
 struct Strip {
     stitches: Vec<Stitch>,
@@ -156,7 +157,8 @@ struct Strip {
     length: f64,
     /// The farthest apex from its edge, metres.
     width: f64,
-    end: Option<[f64; 3]>,
+    /// Along the border since the last stitch, metres.
+    gap: f64,
 }
 
 impl Strip {
@@ -348,11 +350,18 @@ impl Borders {
         let mut used = vec![false; self.edges.len()];
         // Where the strip along a border has come to on the other side.
         let mut reached = self.partners();
+        let mut before = None;
         for edge in self.in_order() {
+            let [a, b] = self.edge(edge).ends;
+            let begins = before.replace(b) != Some(a);
+            if begins || strip.gap > LEAST_LENGTH * self.reach[edge as usize] {
+                stitches.append(&mut strip.finished());
+            }
             if used[edge as usize] {
                 continue;
             }
-            let [a, b] = self.edge(edge).ends;
+            let length = wide(a).distance(wide(b));
+            strip.gap += length;
             let [to_a, to_b] = [0, 1].map(|end| {
                 let at = key(self.edge(edge).ends[end]);
                 reached.get(&at).copied()
@@ -388,12 +397,9 @@ impl Borders {
             if walk.iter().any(is_far) {
                 continue;
             }
-            if strip.end != Some(a) {
-                stitches.append(&mut strip.finished());
-            }
             used[edge as usize] = true;
-            strip.end = Some(b);
-            strip.length += wide(a).distance(wide(b));
+            strip.gap = 0.0;
+            strip.length += length;
             let parts = [own.part, goal.part];
             strip.push(Stitch { edge: own.ends, apex: goal.at, parts });
             for other in walk {
