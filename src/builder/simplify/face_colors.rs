@@ -175,8 +175,8 @@ mod tests {
         // As many triangles left of x = 1 as right of it.
         let mut source = sheet(20, |_| RED);
         for (position, color) in source.positions.iter_mut().zip(&mut source.colors) {
-            let narrow = |x: f32| if x <= 5.0 { x * 0.2 } else { 1.0 + (x - 5.0) * 1.8 };
-            position[0] = narrow(position[0]);
+            let x = position[0];
+            position[0] = if x <= 5.0 { x * 0.2 } else { 1.0 + (x - 5.0) * 1.8 };
             *color = WHITE;
         }
         for square in (0..400).filter(|square| square % 20 < 10) {
