@@ -47,6 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("oriented") => Some(LadderStep::Oriented),
         Some("clustering") => Some(LadderStep::Clustering),
         Some("boxes") => Some(LadderStep::Boxes),
+        Some("prisms") => Some(LadderStep::Prisms),
         Some(other) => return Err(format!("no step {other}").into()),
     };
     let hierarchy = HierarchyOptions { without, desired_tris, constants, ..Default::default() };

@@ -26,6 +26,8 @@ pub struct Constants {
     pub simplify: SimplifyConstants,
     /// Boxes for small bodies.
     pub boxes: BoxConstants,
+    /// Extruded footprints for small bodies.
+    pub prisms: PrismConstants,
     /// How errors are found.
     pub measure: MeasureConstants,
 }
@@ -244,6 +246,47 @@ impl Default for BoxConstants {
             wall_rise: 0.5,
             net: 3.0,
             neighbours: 8,
+        }
+    }
+}
+
+/// Extruded footprints for small bodies (`crate::builder::simplify::aggregate::prisms`).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PrismConstants {
+    /// Of the grid over a node's bodies at most, 0 or more; 0: there are no prisms. They are off until
+    /// a build with them takes no longer than 1.5 times one without.
+    pub cells: usize,
+    /// Prisms pay where the budget leaves fewer triangles than this to a body, 0 or more.
+    pub triangles_per_body: usize,
+    /// Cells along the side of a square as large as the footprints have for each triangle, over 0.
+    pub resolution: f64,
+    /// Gaps may be filled that are at most so many times as wide as that square, 0 or more.
+    pub gap: f64,
+    /// A region that is given up counts so many times what is changed, 1 or more.
+    pub net: f64,
+    /// Heights of a body that rise by more than this from cell to cell, as a share of a cell's
+    /// side, are regions of their own, over 0.
+    pub slope: f64,
+    /// Holes and what is left of regions beside their largest part go to a neighbour up to this
+    /// share of that square, 0 or more.
+    pub crumb: f64,
+    /// A roof is by so many standard deviations of the heights that it stands for above their
+    /// mean, 0 or more: a gable's ridge is part of the skyline.
+    pub raise: f64,
+}
+
+impl Default for PrismConstants {
+    fn default() -> Self {
+        Self {
+            cells: 0,
+            triangles_per_body: 20,
+            resolution: 8.0,
+            gap: 2.5,
+            net: 10.0,
+            slope: 1.0,
+            crumb: 0.5,
+            raise: 0.5,
         }
     }
 }

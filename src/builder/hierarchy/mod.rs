@@ -26,6 +26,7 @@ use crate::builder::border::span::original_spans;
 use crate::builder::border::vertex::Border;
 use crate::builder::cut::split::Chunk;
 use crate::builder::error::{Original, SurfaceError};
+use crate::builder::simplify::aggregate::has_many_bodies;
 use crate::builder::simplify::compact::renumber;
 use crate::builder::simplify::merge::merge;
 use crate::builder::simplify::simplified::LadderStep;
@@ -108,7 +109,10 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             })
             .collect();
         let all_leaves = children.iter().all(|(_, plan)| *plan == NodePlan::Leaf);
-        if all_leaves || self.options.simplify_from == SimplifyFrom::Original {
+        let from_original = all_leaves
+            || self.options.simplify_from == SimplifyFrom::Original
+            || has_many_bodies(&mesh, self.up, budget, &self.options.constants);
+        if from_original {
             let from_original = || {
                 let source = self.original(mesh, border, stitches, moved, &node);
                 self.coarse_node(source, node)

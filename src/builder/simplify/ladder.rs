@@ -11,17 +11,18 @@
 //!    - vertex clustering ([`crate::builder::simplify::cluster`]), which has no topology to respect;
 //!      where parts are large, only if collapse moves the surface farther.
 //!
-//! Where the mesh is many separate bodies and the budget leaves few triangles to each, boxes for
-//! them (`crate::builder::simplify::aggregate`) are tried against what the ladder gave, by the same measure.
+//! Where the mesh is many separate bodies and the budget leaves few triangles to each, boxes and
+//! extruded footprints for them (`crate::builder::simplify::aggregate`) are tried against what the
+//! ladder gave, by the same measure.
 //!
 //! Border vertices that the level keeps are locked throughout.
 
 use std::cmp::Ordering;
 
 use crate::builder::border::vertex::{Border, BorderVertexState, Path};
-use crate::builder::constants::{BoxConstants, Constants};
+use crate::builder::constants::Constants;
 use crate::builder::error::MeanDistance;
-use crate::builder::simplify::aggregate::{Aggregated, aggregate};
+use crate::builder::simplify::aggregate::{Aggregated, aggregate, extrude, without_floors};
 use crate::builder::simplify::cluster::cluster;
 pub use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::builder::simplify::collapse::collapse;
@@ -92,10 +93,16 @@ pub fn simplify(
         return source;
     }
     let collapsed = |step| collapse(&source.mesh, &source.border, &locked, target, step, weights);
-    let boxes = match tries(LadderStep::Boxes) {
-        true => boxes(&source, &locked, up, target, weights, &constants.boxes),
-        false => None,
-    };
+    let completed =
+        |aggregated, step| complete(&source, aggregated, &locked, target, weights, step);
+    let boxes = tries(LadderStep::Boxes)
+        .then(|| aggregate(&source.mesh, &locked, up, target, &constants.boxes))
+        .flatten()
+        .map(|aggregated| completed(aggregated, LadderStep::Boxes));
+    let prisms = tries(LadderStep::Prisms)
+        .then(|| extrude(&source.mesh, &locked, up, target, constants))
+        .flatten()
+        .map(|aggregated| completed(aggregated, LadderStep::Prisms));
     let mut best = collapsed(LadderStep::Collapse);
     if best.mesh.triangles.len() > limit && tries(LadderStep::Permissive) {
         let permissive = collapsed(LadderStep::Permissive);
@@ -125,13 +132,21 @@ pub fn simplify(
         }
     }
     candidates.extend(boxes);
+    // Prisms have no floors, which nobody misses.
+    let seen = |mesh: &Mesh| without_floors(mesh, up);
+    let has_prisms = prisms.is_some();
+    candidates.extend(prisms);
     if candidates.is_empty() {
         return best;
     }
-    let mut from_source = MeanDistance::from(&source.mesh, constants.measure);
+    let source_seen = if has_prisms { &seen(&source.mesh) } else { &source.mesh };
+    let mut from_source = MeanDistance::from(source_seen, constants.measure);
     let mut rank = |candidate: &Simplified, best: (Rank, f64)| {
         let nearest = if best.0 == Rank::Near { best.1 } else { f64::INFINITY };
-        let distance = || from_source.to(&candidate.mesh, nearest);
+        let distance = || match has_prisms {
+            true => from_source.to(&seen(&candidate.mesh), nearest),
+            false => from_source.to(&candidate.mesh, nearest),
+        };
         Rank::of(candidate.mesh.triangles.len(), limit, distance, share)
     };
     let mut best = (rank(&best, (Rank::FarOver, f64::INFINITY)), best);
@@ -199,26 +214,26 @@ fn wound(
     Some(Simplified { mesh, border, error: 0.0, step })
 }
 
-/// Boxes for small bodies, and the rest collapsed; `None` where there are too few bodies.
-fn boxes(
+/// Bodies as they were aggregated, and the rest collapsed.
+fn complete(
     source: &Simplified,
+    aggregated: Aggregated,
     locked: &[bool],
-    up: UpAxis,
     target: usize,
     weights: AppearanceWeights,
-    constants: &BoxConstants,
-) -> Option<Simplified> {
-    let Aggregated { boxes, rest } = aggregate(&source.mesh, locked, up, target, constants)?;
+    step: LadderStep,
+) -> Simplified {
+    let Aggregated { boxes, rest } = aggregated;
     let for_rest = target.saturating_sub(boxes.triangles.len()).max(1);
     let rest = Mesh { triangles: rest, ..source.mesh.clone() };
     let mut result = if rest.triangles.len() > for_rest {
         // Nothing is left out here: that is for small bodies, which are boxes.
-        collapse(&rest, &source.border, locked, for_rest, LadderStep::Boxes, weights)
+        collapse(&rest, &source.border, locked, for_rest, step, weights)
     } else {
         let (mesh, border) = compact(&rest, &source.border);
         Simplified { mesh, border, error: 0.0, step: LadderStep::Collapse }
     };
-    result.step = LadderStep::Boxes;
+    result.step = step;
     let first = result.mesh.positions.len() as u32;
     result.mesh.triangles.extend(boxes.triangles.iter().map(|t| t.map(|vertex| first + vertex)));
     result.border.planes.resize(result.border.planes.len() + boxes.positions.len(), 0);
@@ -226,7 +241,7 @@ fn boxes(
     result.mesh.positions.extend(boxes.positions);
     result.mesh.colors.extend(boxes.colors);
     result.mesh.materials.extend(boxes.materials);
-    Some(result)
+    result
 }
 
 fn clustered(mesh: &Mesh, border: &Border, locked: &[bool], target: usize) -> Simplified {

@@ -1,6 +1,6 @@
 //! Bringing a node to its triangle budget.
 
-mod aggregate;
+pub(crate) mod aggregate;
 pub mod cluster;
 pub mod collapse;
 pub mod compact;

@@ -34,6 +34,8 @@ pub enum LadderStep {
     Clustering,
     /// Boxes in place of small separate bodies, and edge collapse of the rest.
     Boxes,
+    /// Extruded footprints in place of separate bodies, and edge collapse of the rest.
+    Prisms,
     /// The largest triangles alone, where simplification would leave nothing.
     Fallback,
 }
@@ -49,6 +51,7 @@ impl LadderStep {
             Self::Oriented => "edge collapse of faces turned one way",
             Self::Clustering => "vertex clustering",
             Self::Boxes => "boxes for small separate bodies",
+            Self::Prisms => "extruded footprints of separate bodies",
             Self::Fallback => "the largest triangles alone",
         }
     }

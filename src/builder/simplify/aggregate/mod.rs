@@ -8,23 +8,41 @@
 //!
 //! Bodies with triangles enough for edge collapse, those that go on beyond a border, and what is no
 //! body (the ground, roads, fences) stay as they are.
+//!
+//! Extruded footprints ([`prisms`]) do the same for bodies of any size and form, in any row and
+//! whichever way their faces wind.
 
 mod bodies;
+mod floors;
 mod joining;
+mod prisms;
 mod solid;
 
 use self::bodies::{Part, parts};
+pub use self::floors::without_floors;
 use self::joining::join_down_to;
+use self::prisms::{Body, prisms};
 use self::solid::Solid;
-use crate::builder::constants::BoxConstants;
+use crate::builder::constants::{BoxConstants, Constants};
 use crate::mesh::{Mesh, UpAxis};
 
-/// A mesh whose small bodies are boxes.
+/// A mesh whose bodies are boxes or prisms.
 pub struct Aggregated {
-    /// The boxes.
+    /// These.
     pub boxes: Mesh,
-    /// The triangles of the mesh that are in none.
+    /// The triangles of the mesh that they do not stand for.
     pub rest: Vec<[u32; 3]>,
+}
+
+/// Whether a mesh has so many separate bodies that prisms may be better than edge collapse for a
+/// node with so many triangles.
+pub fn has_many_bodies(mesh: &Mesh, up: UpAxis, target: usize, constants: &Constants) -> bool {
+    let each = constants.prisms.triangles_per_body;
+    if constants.prisms.cells == 0 || !mesh.texcoords.is_empty() {
+        return false;
+    }
+    let is_body = |part: &Part| Body::of(mesh, &part.triangles, up, &constants.boxes).is_some();
+    parts(mesh).into_iter().filter(is_body).count() * each > target
 }
 
 /// Replaces the small bodies of an untextured `mesh` by boxes, so that some `target` triangles are
@@ -73,6 +91,46 @@ pub fn aggregate(
     for solid in &solids {
         solid.add_to(&mut boxes, mesh, up);
     }
+    Some(Aggregated { boxes, rest })
+}
+
+/// Prisms are made of so many triangles at least.
+const LEAST_TRIANGLES: usize = 16;
+
+/// Replaces the bodies of an untextured `mesh` by prisms, as [`aggregate`] does by boxes; `None`
+/// where there are too few, or these have too many borders for so few triangles.
+pub fn extrude(
+    mesh: &Mesh,
+    locked: &[bool],
+    up: UpAxis,
+    target: usize,
+    constants: &Constants,
+) -> Option<Aggregated> {
+    if constants.prisms.cells == 0 || !mesh.texcoords.is_empty() {
+        return None;
+    }
+    let (mut bodies, mut rest) = (Vec::new(), Vec::new());
+    let parts = parts(mesh);
+    let (mut in_bodies, mut area) = (0.0, 0.0);
+    for part in &parts {
+        area += part.area;
+        let is_free = || !part.triangles.iter().flatten().any(|&vertex| locked[vertex as usize]);
+        let body =
+            is_free().then(|| Body::of(mesh, &part.triangles, up, &constants.boxes)).flatten();
+        match body {
+            Some(body) => {
+                in_bodies += part.area;
+                bodies.push(body);
+            }
+            None => rest.extend_from_slice(&part.triangles),
+        }
+    }
+    if bodies.len() * constants.prisms.triangles_per_body <= target {
+        return None;
+    }
+    let share = target as f64 * in_bodies / area;
+    let for_bodies = share.max(target as f64 - rest.len() as f64) as usize;
+    let boxes = prisms(mesh, &bodies, up, for_bodies.max(LEAST_TRIANGLES), &constants.prisms)?;
     Some(Aggregated { boxes, rest })
 }
 
@@ -126,6 +184,51 @@ mod tests {
             aggregate(&mesh, &locked, UpAxis::Z, 300, &BoxConstants::default()).unwrap().rest;
         assert_eq!(kept.len(), 1 + 14);
         assert!(kept.iter().flatten().any(|&vertex| vertex == 0));
+    }
+
+    #[test]
+    fn a_town_becomes_prisms_of_its_footprint_and_volume() {
+        let mesh = town();
+        let mut constants = Constants::default();
+        constants.prisms.cells = 1 << 18;
+        let free = vec![false; mesh.positions.len()];
+        // With 6 triangles for each house rows are joined over gaps of 6 m, which are filled.
+        for (target, most) in [(600, 1.5), (1200, 1.03)] {
+            let Aggregated { boxes, rest } =
+                extrude(&mesh, &free, UpAxis::Z, target, &constants).unwrap();
+            assert_eq!(rest.len(), 1, "the ground");
+            let count = boxes.triangles.len();
+            assert!(count > target / 2 && count <= target + target / 10, "{count}");
+            // Gables from 5 to 8 m: their mean and half of the standard deviation.
+            let high = 6.5 + 0.5 * (9.0f64 / 12.0).sqrt();
+            let roofs = boxes.positions.iter().map(|p| f64::from(p[2])).filter(|&z| z > 0.01);
+            for roof in roofs {
+                assert!((roof - high).abs() < 0.1, "{roof}");
+            }
+            // Of closed walls that face outwards, on the ground, where a floor would add nothing.
+            let six = |&t: &[u32; 3]| {
+                let [a, b, c] = boxes.corners(t);
+                a.dot(b.cross(c))
+            };
+            let volume = boxes.triangles.iter().map(six).sum::<f64>() / 6.0;
+            let covered: f64 = boxes
+                .triangles
+                .iter()
+                .map(|&t| {
+                    let [a, b, c] = boxes.corners(t);
+                    (b - a).cross(c - a).z.max(0.0) * 0.5
+                })
+                .sum();
+            assert!((volume / covered - high).abs() < 0.1, "{volume} {covered}");
+            assert!((0.97..most).contains(&(covered / 8000.0)), "{covered}");
+        }
+        let mut locked = free.clone();
+        locked[0] = true;
+        let kept = extrude(&mesh, &locked, UpAxis::Z, 600, &constants).unwrap().rest;
+        assert_eq!(kept.len(), 1 + 14);
+        assert!(extrude(&mesh, &free, UpAxis::Z, 2000, &constants).is_none(), "enough for all");
+        constants.prisms.cells = 0;
+        assert!(extrude(&mesh, &free, UpAxis::Z, 600, &constants).is_none());
     }
 
     #[test]

@@ -10,11 +10,11 @@ pub(super) const TRIANGLES: usize = 10;
 
 /// What a side of a box looks like.
 #[derive(Clone, Copy)]
-struct Look {
+pub(super) struct Look {
     /// A vertex with its material.
-    vertex: u32,
+    pub(super) vertex: u32,
     /// Linear, 0 to 65535.
-    color: [f64; 4],
+    pub(super) color: [f64; 4],
 }
 
 /// An upright box, metres, Z up.
@@ -49,15 +49,16 @@ struct Sums {
     wall: LookSum,
 }
 
+/// What triangles look like on average.
 #[derive(Default)]
-struct LookSum {
+pub(super) struct LookSum {
     largest: (f64, u32),
-    area: f64,
+    pub(super) area: f64,
     color: [f64; 4],
 }
 
 impl LookSum {
-    fn add(&mut self, mesh: &Mesh, triangle: [u32; 3], area: f64) {
+    pub(super) fn add(&mut self, mesh: &Mesh, triangle: [u32; 3], area: f64) {
         if area > self.largest.0 {
             self.largest = (area, triangle[0]);
         }
@@ -71,7 +72,7 @@ impl LookSum {
         }
     }
 
-    fn look(&self) -> Option<Look> {
+    pub(super) fn look(&self) -> Option<Look> {
         (self.area > 0.0)
             .then(|| Look { vertex: self.largest.1, color: self.color.map(|sum| sum / self.area) })
     }
