@@ -46,7 +46,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("prune") => Some(LadderStep::Prune),
         Some("oriented") => Some(LadderStep::Oriented),
         Some("clustering") => Some(LadderStep::Clustering),
-        Some("boxes") => Some(LadderStep::Boxes),
         Some("prisms") => Some(LadderStep::Prisms),
         Some(other) => return Err(format!("no step {other}").into()),
     };

@@ -16,7 +16,7 @@ STEPS = {
     "prune": "edge collapse without the smallest separate parts",
     "oriented": "edge collapse of faces turned one way",
     "clustering": "vertex clustering",
-    "boxes": "boxes for small separate bodies",
+    "prisms": "extruded footprints of separate bodies",
 }
 SETS = [
     "sceaux",

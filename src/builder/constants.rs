@@ -24,8 +24,6 @@ pub struct Constants {
     pub border: BorderConstants,
     /// Which way of simplifying is taken.
     pub simplify: SimplifyConstants,
-    /// Boxes for small bodies.
-    pub boxes: BoxConstants,
     /// Extruded footprints for small bodies.
     pub prisms: PrismConstants,
     /// How errors are found.
@@ -202,50 +200,19 @@ pub struct SimplifyConstants {
     /// closed surface that folded flat somewhere on a finer level has two faces in one place there;
     /// both stay, and it stays closed.
     pub few_faces: f64,
+    /// A part of which nothing is left comes back where all that is left is farther away than so
+    /// many times the side of a square as large as a triangle may be, 0 or more.
+    pub far_part: f64,
 }
 
 impl Default for SimplifyConstants {
     fn default() -> Self {
-        Self { doubtful: 0.1, doubtful_connected: 0.2, scattered_part: 300, few_faces: 0.02 }
-    }
-}
-
-/// Boxes for small bodies (`crate::builder::simplify::aggregate`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BoxConstants {
-    /// A body whose share of the budget, by its surface, is at least so many triangles keeps its
-    /// form, 0 or more.
-    pub enough_triangles: f64,
-    /// Boxes pay where the budget leaves fewer triangles than this to a body, 0 or more.
-    pub triangles_per_body: usize,
-    /// A body is at least so high for the side of a square as large as its footprint, 0 or more: a
-    /// sloping road is not.
-    pub least_height: f64,
-    /// It has at least this share of its box's walls, 0–1.
-    pub least_walls: f64,
-    /// It has at least this share of its box's volume, 0–1.
-    pub least_volume: f64,
-    /// A surface is a wall where its normal's rise is at most this, 0–1.
-    pub wall_rise: f64,
-    /// Area that is gone counts so many times what is elsewhere, 1 or more: from afar only the mean
-    /// is seen.
-    pub net: f64,
-    /// Neighbours of a box that it may be joined with at first, 1 or more.
-    pub neighbours: usize,
-}
-
-impl Default for BoxConstants {
-    fn default() -> Self {
         Self {
-            enough_triangles: 24.0,
-            triangles_per_body: 12,
-            least_height: 0.1,
-            least_walls: 0.3,
-            least_volume: 0.5,
-            wall_rise: 0.5,
-            net: 3.0,
-            neighbours: 8,
+            doubtful: 0.1,
+            doubtful_connected: 0.2,
+            scattered_part: 300,
+            few_faces: 0.02,
+            far_part: 1.0,
         }
     }
 }
@@ -254,11 +221,12 @@ impl Default for BoxConstants {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PrismConstants {
-    /// Of the grid over a node's bodies at most, 0 or more; 0: there are no prisms. They are off until
-    /// a build with them takes no longer than 1.5 times one without.
+    /// Of the grid over a node's bodies at most, 0 or more; 0: there are no prisms.
     pub cells: usize,
     /// Prisms pay where the budget leaves fewer triangles than this to a body, 0 or more.
     pub triangles_per_body: usize,
+    /// Where it leaves fewer than this, nothing else is tried, 0 or more.
+    pub sure: f64,
     /// Cells along the side of a square as large as the footprints have for each triangle, over 0.
     pub resolution: f64,
     /// Gaps may be filled that are at most so many times as wide as that square, 0 or more.
@@ -274,19 +242,30 @@ pub struct PrismConstants {
     /// A roof is by so many standard deviations of the heights that it stands for above their
     /// mean, 0 or more: a gable's ridge is part of the skyline.
     pub raise: f64,
+    /// A body is at least so high for the side of a square as large as its footprint, 0 or more: a
+    /// sloping road is not.
+    pub least_height: f64,
+    /// It has at least this share of the walls of the box around it, 0–1.
+    pub least_walls: f64,
+    /// A surface is a wall where its normal's rise is at most this, 0–1.
+    pub wall_rise: f64,
 }
 
 impl Default for PrismConstants {
     fn default() -> Self {
         Self {
-            cells: 0,
-            triangles_per_body: 20,
-            resolution: 8.0,
-            gap: 2.5,
+            cells: 1 << 20,
+            triangles_per_body: 16,
+            sure: 4.0,
+            resolution: 5.0,
+            gap: 2.0,
             net: 10.0,
             slope: 1.0,
             crumb: 0.5,
             raise: 0.5,
+            least_height: 0.1,
+            least_walls: 0.3,
+            wall_rise: 0.5,
         }
     }
 }

@@ -253,7 +253,8 @@ fn nearest_weights(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
         return [0.0, 1.0, 0.0];
     }
     let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+    // Of a side without length the other two know more.
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 && d1 > d3 {
         let v = d1 / (d1 - d3);
         return [1.0 - v, v, 0.0];
     }
@@ -263,13 +264,14 @@ fn nearest_weights(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
         return [0.0, 0.0, 1.0];
     }
     let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 && d2 > d6 {
         let w = d2 / (d2 - d6);
         return [1.0 - w, 0.0, w];
     }
     let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    let length = (d4 - d3) + (d5 - d6);
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 && length > 0.0 {
+        let w = (d4 - d3) / length;
         return [0.0, 1.0 - w, w];
     }
     let sum = va + vb + vc;
@@ -339,6 +341,20 @@ mod tests {
                 assert_eq!(near.len(), count);
             }
         }
+    }
+
+    #[test]
+    fn triangles_without_area_are_as_near_as_their_longest_side() {
+        let (o, x) = (DVec3::ZERO, DVec3::X);
+        let flat = [[o, o, x], [o, x, o], [x, o, o], [o, x, x], [o, x, x * 0.5], [x * 0.5, x, o]];
+        for corners in flat {
+            for (at, expected) in [(-1.0, 1.0), (0.25, 0.0), (0.75, 0.0), (3.0, 2.0)] {
+                let Hit { weights, squared, .. } = hit(x * at + DVec3::Y, 0, corners);
+                assert!((squared - expected * expected - 1.0).abs() < 1e-12, "{corners:?} {at}");
+                assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{weights:?}");
+            }
+        }
+        assert_eq!(hit(x, 0, [o; 3]).squared, 1.0);
     }
 
     #[test]

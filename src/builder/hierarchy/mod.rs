@@ -111,7 +111,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let all_leaves = children.iter().all(|(_, plan)| *plan == NodePlan::Leaf);
         let from_original = all_leaves
             || self.options.simplify_from == SimplifyFrom::Original
-            || has_many_bodies(&mesh, self.up, budget, &self.options.constants);
+            || has_many_bodies(&mesh, self.up, budget, &self.options.constants.prisms);
         if from_original {
             let from_original = || {
                 let source = self.original(mesh, border, stitches, moved, &node);

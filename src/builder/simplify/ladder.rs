@@ -11,9 +11,10 @@
 //!    - vertex clustering ([`crate::builder::simplify::cluster`]), which has no topology to respect;
 //!      where parts are large, only if collapse moves the surface farther.
 //!
-//! Where the mesh is many separate bodies and the budget leaves few triangles to each, boxes and
-//! extruded footprints for them (`crate::builder::simplify::aggregate`) are tried against what the
-//! ladder gave, by the same measure.
+//! Where the mesh is many separate bodies and the budget leaves few triangles to each, extruded
+//! footprints for them (`crate::builder::simplify::aggregate`) are tried against what the ladder
+//! gave, by the same measure; where it leaves so few that nothing else would keep them, they are
+//! taken at once.
 //!
 //! Border vertices that the level keeps are locked throughout.
 
@@ -22,12 +23,13 @@ use std::cmp::Ordering;
 use crate::builder::border::vertex::{Border, BorderVertexState, Path};
 use crate::builder::constants::Constants;
 use crate::builder::error::MeanDistance;
-use crate::builder::simplify::aggregate::{Aggregated, aggregate, extrude, without_floors};
+use crate::builder::simplify::aggregate::{Extruded, extrude, without_floors};
 use crate::builder::simplify::cluster::cluster;
 pub use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::builder::simplify::collapse::collapse;
 use crate::builder::simplify::compact::compact;
 use crate::builder::simplify::connected::Connected;
+use crate::builder::simplify::far_parts::keep_far_parts;
 use crate::builder::simplify::orient::{has_duplicate_faces, oriented};
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::mesh::{Mesh, UpAxis};
@@ -75,8 +77,7 @@ pub fn simplify(
     target: usize,
     method: &Method,
 ) -> Simplified {
-    let &Method { simplifier, weights, up, reorientable, without, constants } = method;
-    let tries = |step| without != Some(step);
+    let &Method { simplifier, constants, .. } = method;
     let (mesh, border) = compact(mesh, border);
     let locked: Vec<bool> = border
         .planes
@@ -92,17 +93,39 @@ pub fn simplify(
     if source.mesh.triangles.len() <= target {
         return source;
     }
-    let collapsed = |step| collapse(&source.mesh, &source.border, &locked, target, step, weights);
-    let completed =
-        |aggregated, step| complete(&source, aggregated, &locked, target, weights, step);
-    let boxes = tries(LadderStep::Boxes)
-        .then(|| aggregate(&source.mesh, &locked, up, target, &constants.boxes))
-        .flatten()
-        .map(|aggregated| completed(aggregated, LadderStep::Boxes));
-    let prisms = tries(LadderStep::Prisms)
-        .then(|| extrude(&source.mesh, &locked, up, target, constants))
-        .flatten()
-        .map(|aggregated| completed(aggregated, LadderStep::Prisms));
+    let mut simplified = nearest(&source, &locked, target, limit, method);
+    let reach = constants.simplify.far_part * share(&source.mesh, target);
+    keep_far_parts(&mut simplified, &source, &locked, reach, limit);
+    simplified
+}
+
+/// The side of a square as large as a triangle may be, metres.
+fn share(mesh: &Mesh, target: usize) -> f64 {
+    (mesh.area() / target as f64).sqrt()
+}
+
+/// What of the ladder's steps stays nearest to the source.
+fn nearest(
+    source: &Simplified,
+    locked: &[bool],
+    target: usize,
+    limit: usize,
+    method: &Method,
+) -> Simplified {
+    let &Method { weights, up, reorientable, without, constants, .. } = method;
+    let tries = |step| without != Some(step);
+    let collapsed = |step| collapse(&source.mesh, &source.border, locked, target, step, weights);
+    let mut prisms = None;
+    if tries(LadderStep::Prisms)
+        && let Some(extruded) = extrude(&source.mesh, locked, up, target, &constants.prisms)
+    {
+        let is_sure = extruded.triangles_per_body < constants.prisms.sure;
+        let completed = completed(source, extruded, locked, target, weights);
+        if is_sure && completed.mesh.triangles.len() <= limit {
+            return completed;
+        }
+        prisms = Some(completed);
+    }
     let mut best = collapsed(LadderStep::Collapse);
     if best.mesh.triangles.len() > limit && tries(LadderStep::Permissive) {
         let permissive = collapsed(LadderStep::Permissive);
@@ -111,12 +134,12 @@ pub fn simplify(
         }
     }
     let mut candidates = Vec::new();
-    let share = (source.mesh.area() / target as f64).sqrt();
+    let share = share(&source.mesh, target);
     let rules = &constants.simplify;
     let is_unfit =
         best.mesh.triangles.len() > limit || has_duplicate_faces(&source.mesh, rules.few_faces);
     if is_unfit || best.error > rules.doubtful * share {
-        let connected = Connected::of(&source.mesh, &locked);
+        let connected = Connected::of(&source.mesh, locked);
         // Over one sheet without seams it does what collapse did.
         if tries(LadderStep::Prune) && (connected.parts > 1 || connected.has_seams) {
             candidates.push(collapsed(LadderStep::Prune));
@@ -124,14 +147,13 @@ pub fn simplify(
         let is_scattered = source.mesh.triangles.len() < connected.parts * rules.scattered_part;
         let is_far = is_unfit || is_scattered || best.error > rules.doubtful_connected * share;
         if tries(LadderStep::Clustering) && is_far {
-            candidates.push(clustered(&source.mesh, &source.border, &locked, target));
+            candidates.push(clustered(&source.mesh, &source.border, locked, target));
         }
         if tries(LadderStep::Oriented) {
             let few = rules.few_faces;
-            candidates.extend(wound(&source, &locked, target, weights, reorientable, few));
+            candidates.extend(wound(&source, locked, target, weights, reorientable, few));
         }
     }
-    candidates.extend(boxes);
     // Prisms have no floors, which nobody misses.
     let seen = |mesh: &Mesh| without_floors(mesh, up);
     let has_prisms = prisms.is_some();
@@ -214,33 +236,27 @@ fn wound(
     Some(Simplified { mesh, border, error: 0.0, step })
 }
 
-/// Bodies as they were aggregated, and the rest collapsed.
-fn complete(
+/// Bodies as they were extruded, and the rest collapsed.
+fn completed(
     source: &Simplified,
-    aggregated: Aggregated,
+    extruded: Extruded,
     locked: &[bool],
     target: usize,
     weights: AppearanceWeights,
-    step: LadderStep,
 ) -> Simplified {
-    let Aggregated { boxes, rest } = aggregated;
-    let for_rest = target.saturating_sub(boxes.triangles.len()).max(1);
+    let Extruded { prisms, rest, .. } = extruded;
+    let step = LadderStep::Prisms;
+    let for_rest = target.saturating_sub(prisms.triangles.len()).max(1);
     let rest = Mesh { triangles: rest, ..source.mesh.clone() };
     let mut result = if rest.triangles.len() > for_rest {
-        // Nothing is left out here: that is for small bodies, which are boxes.
+        // Nothing is left out here: that is for small bodies, which are prisms.
         collapse(&rest, &source.border, locked, for_rest, step, weights)
     } else {
         let (mesh, border) = compact(&rest, &source.border);
-        Simplified { mesh, border, error: 0.0, step: LadderStep::Collapse }
+        Simplified { mesh, border, error: 0.0, step }
     };
-    result.step = step;
-    let first = result.mesh.positions.len() as u32;
-    result.mesh.triangles.extend(boxes.triangles.iter().map(|t| t.map(|vertex| first + vertex)));
-    result.border.planes.resize(result.border.planes.len() + boxes.positions.len(), 0);
-    result.border.keep.resize(result.border.keep.len() + boxes.positions.len(), 0);
-    result.mesh.positions.extend(boxes.positions);
-    result.mesh.colors.extend(boxes.colors);
-    result.mesh.materials.extend(boxes.materials);
+    let border = Border::interior(prisms.positions.len());
+    result.append(prisms, border);
     result
 }
 
@@ -291,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn many_houses_with_few_triangles_each_become_boxes() {
+    fn many_houses_with_few_triangles_each_become_prisms() {
         let mesh = houses(200);
         let border = Border::interior(mesh.positions.len());
         let simplified = |target| {
@@ -302,7 +318,7 @@ mod tests {
             simplify(&mesh, &border, &Path::default(), 0, target, &method)
         };
         let few = simplified(600);
-        assert_eq!(few.step, LadderStep::Boxes);
+        assert_eq!(few.step, LadderStep::Prisms);
         assert!(few.mesh.triangles.len() <= 660, "{}", few.mesh.triangles.len());
         assert_eq!(few.border.keep.len(), few.mesh.positions.len());
         let alone = collapse(
@@ -310,13 +326,13 @@ mod tests {
             &border,
             &vec![false; mesh.positions.len()],
             600,
-            LadderStep::Boxes,
+            LadderStep::Prisms,
             AppearanceWeights::default(),
         );
         let to = |other: &Mesh| {
             MeanDistance::from(&mesh, MeasureConstants::default()).to(other, f64::INFINITY)
         };
         assert!(to(&few.mesh) < to(&alone.mesh), "{} {}", to(&few.mesh), to(&alone.mesh));
-        assert_ne!(simplified(2400).step, LadderStep::Boxes, "enough for all");
+        assert_ne!(simplified(2400).step, LadderStep::Prisms, "enough for all");
     }
 }

@@ -16,6 +16,21 @@ pub struct Simplified {
     pub step: LadderStep,
 }
 
+impl Simplified {
+    /// Adds another mesh, whose vertices lie on no border or on the same ones.
+    pub fn append(&mut self, other: Mesh, border: Border) {
+        let first = self.mesh.positions.len() as u32;
+        let triangles = other.triangles.iter().map(|t| t.map(|vertex| first + vertex));
+        self.mesh.triangles.extend(triangles);
+        self.mesh.positions.extend(other.positions);
+        self.mesh.texcoords.extend(other.texcoords);
+        self.mesh.colors.extend(other.colors);
+        self.mesh.materials.extend(other.materials);
+        self.border.planes.extend(border.planes);
+        self.border.keep.extend(border.keep);
+    }
+}
+
 /// The step of the ladder that gave a node its triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -32,8 +47,6 @@ pub enum LadderStep {
     Oriented,
     /// Vertex clustering.
     Clustering,
-    /// Boxes in place of small separate bodies, and edge collapse of the rest.
-    Boxes,
     /// Extruded footprints in place of separate bodies, and edge collapse of the rest.
     Prisms,
     /// The largest triangles alone, where simplification would leave nothing.
@@ -50,7 +63,6 @@ impl LadderStep {
             Self::Prune => "edge collapse without the smallest separate parts",
             Self::Oriented => "edge collapse of faces turned one way",
             Self::Clustering => "vertex clustering",
-            Self::Boxes => "boxes for small separate bodies",
             Self::Prisms => "extruded footprints of separate bodies",
             Self::Fallback => "the largest triangles alone",
         }

@@ -1,6 +1,6 @@
 //! What nobody sees of bodies.
 
-use super::bodies::{Part, parts};
+use crate::builder::simplify::parts::{Part, parts};
 use crate::mesh::{Mesh, UpAxis, wide};
 
 /// A part is a body where it is at least so high for the side of a square as large as it is from

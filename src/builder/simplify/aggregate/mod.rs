@@ -1,112 +1,60 @@
-//! Boxes in place of many small separate bodies.
+//! Extruded footprints in place of many small separate bodies.
 //!
 //! Edge collapse never joins parts that do not touch. Where a node may spend but a few triangles on
 //! each of hundreds of buildings, most fall to slivers or go, and with them the volume and the
-//! skyline that a city has from afar. Here each small closed body becomes a box over its footprint,
-//! as high as its roof is on average, and boxes are joined with a neighbour or left out, always what
-//! changes least of what is seen from above and from the sides, until there are as few as asked.
+//! skyline that a city has from afar. Here they become [`prisms`]: blocks of neighbours of about one
+//! height, over their footprint, as high as their roofs are on average, always what changes least of
+//! what is seen from above and from the sides.
 //!
-//! Bodies with triangles enough for edge collapse, those that go on beyond a border, and what is no
-//! body (the ground, roads, fences) stay as they are.
-//!
-//! Extruded footprints ([`prisms`]) do the same for bodies of any size and form, in any row and
-//! whichever way their faces wind.
+//! Those that go on beyond a border, and what is no body (the ground, roads, fences) stay as they
+//! are.
 
-mod bodies;
 mod floors;
-mod joining;
+mod look;
 mod prisms;
-mod solid;
 
-use self::bodies::{Part, parts};
 pub use self::floors::without_floors;
-use self::joining::join_down_to;
 use self::prisms::{Body, prisms};
-use self::solid::Solid;
-use crate::builder::constants::{BoxConstants, Constants};
+use crate::builder::constants::PrismConstants;
+use crate::builder::simplify::parts::{Part, parts};
 use crate::mesh::{Mesh, UpAxis};
 
-/// A mesh whose bodies are boxes or prisms.
-pub struct Aggregated {
+/// A mesh whose bodies are prisms.
+pub struct Extruded {
     /// These.
-    pub boxes: Mesh,
+    pub prisms: Mesh,
     /// The triangles of the mesh that they do not stand for.
     pub rest: Vec<[u32; 3]>,
+    /// How many triangles there are for each body that they stand for.
+    pub triangles_per_body: f64,
 }
 
 /// Whether a mesh has so many separate bodies that prisms may be better than edge collapse for a
 /// node with so many triangles.
-pub fn has_many_bodies(mesh: &Mesh, up: UpAxis, target: usize, constants: &Constants) -> bool {
-    let each = constants.prisms.triangles_per_body;
-    if constants.prisms.cells == 0 || !mesh.texcoords.is_empty() {
+pub fn has_many_bodies(mesh: &Mesh, up: UpAxis, target: usize, constants: &PrismConstants) -> bool {
+    let each = constants.triangles_per_body;
+    if constants.cells == 0 || !mesh.texcoords.is_empty() {
         return false;
     }
-    let is_body = |part: &Part| Body::of(mesh, &part.triangles, up, &constants.boxes).is_some();
-    parts(mesh).into_iter().filter(is_body).count() * each > target
-}
-
-/// Replaces the small bodies of an untextured `mesh` by boxes, so that some `target` triangles are
-/// left for all if the rest is simplified too; `None` where there are too few to be worth it.
-/// Nothing that has a `locked` vertex is replaced.
-pub fn aggregate(
-    mesh: &Mesh,
-    locked: &[bool],
-    up: UpAxis,
-    target: usize,
-    constants: &BoxConstants,
-) -> Option<Aggregated> {
-    if !mesh.texcoords.is_empty() {
-        return None;
-    }
     let parts = parts(mesh);
-    if parts.len() * constants.triangles_per_body <= target {
-        return None;
-    }
-    let area: f64 = parts.iter().map(|part| part.area).sum();
-    let share = |part_area: f64| target as f64 * part_area / area;
-    let (mut solids, mut boxed_area, mut rest) = (Vec::new(), 0.0, Vec::new());
-    for part in parts {
-        let is_free = || !part.triangles.iter().flatten().any(|&vertex| locked[vertex as usize]);
-        let solid = (share(part.area) < constants.enough_triangles && is_free())
-            .then(|| Solid::of(mesh, &part.triangles, up, constants))
-            .flatten();
-        match solid {
-            Some(solid) => {
-                boxed_area += part.area;
-                solids.push(solid);
-            }
-            None => rest.push(part),
-        }
-    }
-    if solids.len() * constants.triangles_per_body <= target / 2 {
-        return None;
-    }
-    // What the rest does not need is there for boxes.
-    let rest: Vec<[u32; 3]> =
-        rest.into_iter().flat_map(|Part { triangles, .. }| triangles).collect();
-    let for_boxes = share(boxed_area).max(target as f64 - rest.len() as f64);
-    let most = (for_boxes / solid::TRIANGLES as f64) as usize;
-    join_down_to(&mut solids, most.max(1), constants);
-    let mut boxes = Mesh::default();
-    for solid in &solids {
-        solid.add_to(&mut boxes, mesh, up);
-    }
-    Some(Aggregated { boxes, rest })
+    let is_body = |part: &&Part| Body::of(mesh, &part.triangles, up, constants).is_some();
+    parts.len() * each > target && parts.iter().filter(is_body).count() * each > target
 }
 
 /// Prisms are made of so many triangles at least.
 const LEAST_TRIANGLES: usize = 16;
 
-/// Replaces the bodies of an untextured `mesh` by prisms, as [`aggregate`] does by boxes; `None`
-/// where there are too few, or these have too many borders for so few triangles.
+/// Replaces the bodies of an untextured `mesh` by prisms, so that about `target` triangles are left
+/// for all if the rest is simplified too; `None` where there are too few bodies to be worth it, or
+/// these have too many borders for so few triangles. Nothing that has a `locked` vertex is replaced.
 pub fn extrude(
     mesh: &Mesh,
     locked: &[bool],
     up: UpAxis,
     target: usize,
-    constants: &Constants,
-) -> Option<Aggregated> {
-    if constants.prisms.cells == 0 || !mesh.texcoords.is_empty() {
+    constants: &PrismConstants,
+) -> Option<Extruded> {
+    if constants.cells == 0 || !mesh.texcoords.is_empty() {
         return None;
     }
     let (mut bodies, mut rest) = (Vec::new(), Vec::new());
@@ -115,8 +63,7 @@ pub fn extrude(
     for part in &parts {
         area += part.area;
         let is_free = || !part.triangles.iter().flatten().any(|&vertex| locked[vertex as usize]);
-        let body =
-            is_free().then(|| Body::of(mesh, &part.triangles, up, &constants.boxes)).flatten();
+        let body = is_free().then(|| Body::of(mesh, &part.triangles, up, constants)).flatten();
         match body {
             Some(body) => {
                 in_bodies += part.area;
@@ -125,13 +72,16 @@ pub fn extrude(
             None => rest.extend_from_slice(&part.triangles),
         }
     }
-    if bodies.len() * constants.prisms.triangles_per_body <= target {
+    if bodies.len() * constants.triangles_per_body <= target {
         return None;
     }
     let share = target as f64 * in_bodies / area;
-    let for_bodies = share.max(target as f64 - rest.len() as f64) as usize;
-    let boxes = prisms(mesh, &bodies, up, for_bodies.max(LEAST_TRIANGLES), &constants.prisms)?;
-    Some(Aggregated { boxes, rest })
+    // What the rest does not need is there for bodies.
+    let for_bodies = share.max(target as f64 - rest.len() as f64);
+    let triangles_per_body = for_bodies / bodies.len() as f64;
+    let most = (for_bodies as usize).max(LEAST_TRIANGLES);
+    let prisms = prisms(mesh, &bodies, up, most, constants)?;
+    Some(Extruded { prisms, rest, triangles_per_body })
 }
 
 #[cfg(test)]
@@ -165,57 +115,34 @@ mod tests {
     }
 
     #[test]
-    fn a_town_becomes_boxes_and_keeps_its_ground_and_what_is_locked() {
-        let mesh = town();
-        let free = vec![false; mesh.positions.len()];
-        let Aggregated { boxes, rest } =
-            aggregate(&mesh, &free, UpAxis::Z, 300, &BoxConstants::default()).unwrap();
-        assert_eq!(rest.len(), 1, "the ground");
-        let count = boxes.triangles.len();
-        assert!((200..=300).contains(&count) && count.is_multiple_of(solid::TRIANGLES), "{count}");
-        // Walls of 5 m under gables: 6.5 m on average.
-        let heights = boxes.positions.iter().map(|p| p[2]).filter(|&height| height > 0.1);
-        for height in heights {
-            assert!((height - 6.5).abs() < 0.1, "{height}");
-        }
-        let mut locked = free;
-        locked[0] = true;
-        let kept =
-            aggregate(&mesh, &locked, UpAxis::Z, 300, &BoxConstants::default()).unwrap().rest;
-        assert_eq!(kept.len(), 1 + 14);
-        assert!(kept.iter().flatten().any(|&vertex| vertex == 0));
-    }
-
-    #[test]
     fn a_town_becomes_prisms_of_its_footprint_and_volume() {
         let mesh = town();
-        let mut constants = Constants::default();
-        constants.prisms.cells = 1 << 18;
+        let mut constants = PrismConstants { cells: 1 << 18, ..PrismConstants::default() };
         let free = vec![false; mesh.positions.len()];
         // With 6 triangles for each house rows are joined over gaps of 6 m, which are filled.
         for (target, most) in [(600, 1.5), (1200, 1.03)] {
-            let Aggregated { boxes, rest } =
+            let Extruded { prisms, rest, .. } =
                 extrude(&mesh, &free, UpAxis::Z, target, &constants).unwrap();
             assert_eq!(rest.len(), 1, "the ground");
-            let count = boxes.triangles.len();
+            let count = prisms.triangles.len();
             assert!(count > target / 2 && count <= target + target / 10, "{count}");
             // Gables from 5 to 8 m: their mean and half of the standard deviation.
             let high = 6.5 + 0.5 * (9.0f64 / 12.0).sqrt();
-            let roofs = boxes.positions.iter().map(|p| f64::from(p[2])).filter(|&z| z > 0.01);
+            let roofs = prisms.positions.iter().map(|p| f64::from(p[2])).filter(|&z| z > 0.01);
             for roof in roofs {
                 assert!((roof - high).abs() < 0.1, "{roof}");
             }
             // Of closed walls that face outwards, on the ground, where a floor would add nothing.
             let six = |&t: &[u32; 3]| {
-                let [a, b, c] = boxes.corners(t);
+                let [a, b, c] = prisms.corners(t);
                 a.dot(b.cross(c))
             };
-            let volume = boxes.triangles.iter().map(six).sum::<f64>() / 6.0;
-            let covered: f64 = boxes
+            let volume = prisms.triangles.iter().map(six).sum::<f64>() / 6.0;
+            let covered: f64 = prisms
                 .triangles
                 .iter()
                 .map(|&t| {
-                    let [a, b, c] = boxes.corners(t);
+                    let [a, b, c] = prisms.corners(t);
                     (b - a).cross(c - a).z.max(0.0) * 0.5
                 })
                 .sum();
@@ -227,14 +154,7 @@ mod tests {
         let kept = extrude(&mesh, &locked, UpAxis::Z, 600, &constants).unwrap().rest;
         assert_eq!(kept.len(), 1 + 14);
         assert!(extrude(&mesh, &free, UpAxis::Z, 2000, &constants).is_none(), "enough for all");
-        constants.prisms.cells = 0;
+        constants.cells = 0;
         assert!(extrude(&mesh, &free, UpAxis::Z, 600, &constants).is_none());
-    }
-
-    #[test]
-    fn nothing_is_replaced_where_the_budget_does_for_all() {
-        let mesh = town();
-        let free = vec![false; mesh.positions.len()];
-        assert!(aggregate(&mesh, &free, UpAxis::Z, 1300, &BoxConstants::default()).is_none());
     }
 }

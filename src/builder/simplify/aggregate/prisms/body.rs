@@ -2,8 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::builder::constants::BoxConstants;
-use crate::builder::simplify::aggregate::solid::{Look, LookSum};
+use crate::builder::constants::PrismConstants;
+use crate::builder::simplify::aggregate::look::{Look, LookSum};
 use crate::mesh::{Mesh, UpAxis, wide};
 
 /// A separate body with walls and roofs, whichever way its faces wind.
@@ -21,7 +21,7 @@ impl<'a> Body<'a> {
         mesh: &Mesh,
         triangles: &'a [[u32; 3]],
         up: UpAxis,
-        constants: &BoxConstants,
+        constants: &PrismConstants,
     ) -> Option<Self> {
         let at = |vertex: u32| up.z_up(wide(mesh.positions[vertex as usize]));
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);

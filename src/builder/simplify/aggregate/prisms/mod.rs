@@ -15,14 +15,14 @@ mod regions;
 mod tidy;
 
 use glam::{DVec2, DVec3};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use self::arcs::{Arc, HalfArc, arcs, rings, twice_area};
 pub(super) use self::body::Body;
 use self::heights::{Grid, Heights, NONE};
 use self::outlines::Outlines;
 use self::regions::{Labels, Regions};
-use super::solid::Look;
+use super::look::Look;
 use crate::builder::constants::PrismConstants;
 use crate::mesh::{Mesh, UpAxis, wide};
 
@@ -47,11 +47,12 @@ pub(super) fn prisms(
             Some(region) => region.height,
             None => labels.regions.get(&other).map_or(0.0, |region| region.low),
         };
-        let step = |arc: &Arc| {
-            let [left, right] = arc.sides;
-            height(left, right) - height(right, left)
+        let step = |[left, right]: [u32; 2]| height(left, right) - height(right, left);
+        let lost = |inside: u32, outside: u32| match labels.regions.get(&inside) {
+            Some(region) if outside == NONE => constants.net * (region.height - region.low),
+            _ => step([inside, outside]).abs(),
         };
-        let mut outlines = Outlines::of(&arcs, step);
+        let mut outlines = Outlines::of(&arcs, step, lost);
         // A ring of n corners is n − 2 triangles.
         let corners = target + 2 * labels.regions.len();
         outlines.simplify(corners);
@@ -60,45 +61,21 @@ pub(super) fn prisms(
         let change = if over > MOST_OVER { f64::INFINITY } else { labels.change + outlines.change };
         (change, (labels, arcs, outlines))
     };
-    let (change, (labels, arcs, outlines)) = least_change(tried);
+    let tried = TRIANGLES_EACH.map(tried);
+    let (change, (labels, arcs, outlines)) =
+        tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     if change == f64::INFINITY {
         return None;
     }
     Some(Walls { mesh, bodies, up, heights: &heights, labels: &labels }.built(&arcs, &outlines))
 }
 
-/// Triangles for a region on average; a box without a floor has ten.
-const TRIANGLES_EACH: [f64; 8] = [8.0, 10.0, 12.5, 16.0, 20.0, 26.0, 36.0, 50.0];
-
-/// Where among them the search starts.
-const FIRST: usize = 3;
+/// Triangles for a region on average, of which the better is taken: by one that is a half more the
+/// change is hardly less, and what has too few regions loses much. A box without a floor has ten.
+const TRIANGLES_EACH: [f64; 2] = [8.0, 12.5];
 
 /// Prisms may have this share of their triangles more.
 const MOST_OVER: f64 = 0.03;
-
-/// What changes least among [`TRIANGLES_EACH`], walking down from the first.
-fn least_change<T>(tried: impl Fn(f64) -> (f64, T)) -> (f64, T) {
-    let mut best = tried(TRIANGLES_EACH[FIRST]);
-    for way in [
-        &mut TRIANGLES_EACH[FIRST + 1..].iter() as &mut dyn Iterator<Item = &f64>,
-        &mut TRIANGLES_EACH[..FIRST].iter().rev(),
-    ] {
-        let mut is_better = false;
-        for &each in way {
-            let next = tried(each);
-            // Fewer regions where none of these has room.
-            if next.0 > best.0 {
-                break;
-            }
-            is_better = next.0 < best.0;
-            best = next;
-        }
-        if is_better {
-            break;
-        }
-    }
-    best
-}
 
 /// The side of a square as large as the footprints have for each triangle, metres.
 fn share(bodies: &[Body], target: usize) -> f64 {
@@ -147,24 +124,31 @@ struct Walls<'a> {
 impl Walls<'_> {
     fn built(&self, arcs: &[Arc], outlines: &Outlines) -> Mesh {
         let looks = self.looks();
+        let is_left = |ring: &[HalfArc]| !ring.iter().any(|half| outlines.is_gone(half.arc));
         let points: Vec<Vec<DVec2>> = (0..arcs.len()).map(|arc| outlines.points(arc)).collect();
         let mut result = Mesh::default();
         let mut by_region: FxHashMap<u32, Vec<Vec<DVec2>>> = FxHashMap::default();
-        for (region, ring) in rings(arcs) {
+        for (region, ring) in rings(arcs).into_iter().filter(|(_, ring)| is_left(ring)) {
             by_region.entry(region).or_default().push(outline(&ring, arcs, &points));
         }
-        for (number, region) in &self.labels.regions {
-            if let Some(rings) = by_region.get(number) {
-                let look = looks[number].roof;
-                for polygon in polygons(rings) {
-                    self.roof(&mut result, &polygon, region.height, look);
-                }
+        let mut roofed = FxHashSet::default();
+        for (&number, region) in &self.labels.regions {
+            let rings = by_region.get(&number).map_or(&[][..], Vec::as_slice);
+            for polygon in polygons(rings) {
+                self.roof(&mut result, &polygon, region.height, looks[&number].roof);
+                roofed.insert(number);
             }
         }
-        for (arc, points) in arcs.iter().zip(&points) {
-            self.wall(&mut result, arc, points, &looks);
+        for (number, (arc, points)) in arcs.iter().zip(&points).enumerate() {
+            if !outlines.is_gone(number) {
+                // Of what is given up as a whole, a tower may be left.
+                let sides = arc.sides.map(|side| roofed.contains(&side).then_some(side));
+                self.wall(&mut result, sides, arc.nodes.is_none(), points, &looks);
+            }
         }
-        result
+        let has_area = |&triangle: &[u32; 3]| result.triangle_area(triangle) > 0.0;
+        let triangles = result.triangles.iter().copied().filter(has_area).collect();
+        Mesh { triangles, ..result }
     }
 
     /// Each region looks like the body that covers most of it.
@@ -218,27 +202,22 @@ impl Walls<'_> {
         }
     }
 
-    /// The wall along an arc, which faces the lower side.
+    /// The wall between the regions at the left and right of a border, which faces the lower one.
     fn wall(
         &self,
         result: &mut Mesh,
-        arc: &Arc,
+        sides: [Option<u32>; 2],
+        is_closed: bool,
         points: &[DVec2],
         looks: &FxHashMap<u32, &Body<'_>>,
     ) {
-        let [left, right] = arc.sides.map(|side| self.labels.regions.get(&side));
-        let (higher, lower, region) = match (left, right) {
-            (Some(left), Some(right)) if left.height >= right.height => {
-                (left.height, Some(right.height), arc.sides[0])
-            }
-            (Some(_), Some(right)) => (right.height, left.map(|left| left.height), arc.sides[1]),
-            (Some(left), None) => (left.height, None, arc.sides[0]),
-            (None, Some(right)) => (right.height, None, arc.sides[1]),
-            (None, None) => return,
-        };
+        let height = |side: Option<u32>| side.map(|region| self.labels.regions[&region].height);
+        let faces_right = height(sides[0]) >= height(sides[1]);
+        let [higher, lower] = if faces_right { sides } else { [sides[1], sides[0]] };
+        let Some(region) = higher else { return };
+        let (higher, lower) = (self.labels.regions[&region].height, height(lower));
         let base = self.labels.regions[&region].low;
         let look = looks[&region].wall;
-        let faces_right = region == arc.sides[0];
         let mut rows = Vec::with_capacity(points.len() + 1);
         for &corner in points {
             let foot = lower.unwrap_or_else(|| self.foot(corner).unwrap_or(base));
@@ -246,7 +225,7 @@ impl Walls<'_> {
             let foot = self.push(result, corner, foot, &look);
             rows.push([foot, self.push(result, corner, higher, &look)]);
         }
-        if arc.nodes.is_none() {
+        if is_closed {
             rows.push(rows[0]);
         }
         for pair in rows.windows(2) {

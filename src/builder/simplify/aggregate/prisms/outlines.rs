@@ -3,15 +3,16 @@
 //! Segment collapse that preserves areas (Kronenfeld, Stanislawski, Buttenfield & Brockmeyer,
 //! 2020): two points become one, so placed that both sides keep their areas if that is near, always
 //! where the area that changes sides, times the step of height there, is least. Corners that a grid has
-//! cut off come back. Borders never cross.
+//! cut off come back. Borders never cross. Closed ones may go as a whole: a courtyard is built over,
+//! or what was inside is as high as what is around it.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
-use glam::DVec2;
-use rustc_hash::{FxHashMap, FxHashSet};
+use glam::{DVec2, IVec2};
+use rustc_hash::FxHashSet;
 
-use super::arcs::{Arc, point};
+use super::arcs::{Arc, point, twice_area};
 use super::heights::NONE as OPEN;
 
 const NONE: u32 = u32::MAX;
@@ -19,12 +20,13 @@ const NONE: u32 = u32::MAX;
 /// Cells of a square of the index of segments.
 const SQUARE: f64 = 8.0;
 
-/// Two points that may become one, or one that may go.
+/// Two points that may become one, or one that may go, or all of a closed arc.
 struct Collapse {
     price: f64,
-    /// The first of the two.
+    /// The first of the two, or of all.
     vertex: u32,
     version: u32,
+    is_whole: bool,
 }
 
 /// Polylines being simplified.
@@ -39,7 +41,7 @@ pub(super) struct Outlines {
     arcs: Vec<State>,
     /// Of arcs without points between the same ends, which would be one.
     straight: FxHashSet<[[i32; 2]; 2]>,
-    squares: FxHashMap<[i32; 2], Vec<u32>>,
+    squares: Squares,
     collapses: BinaryHeap<Reverse<Collapse>>,
     /// Metres of height times cells.
     pub change: f64,
@@ -57,11 +59,22 @@ struct State {
     weight: f64,
     /// Triangles that a segment has: two of a wall and one of each roof.
     triangles: usize,
+    /// What is changed if it goes as a whole, where it may: metres of height times cells.
+    volume: Option<f64>,
 }
 
+/// A closed arc has so many points at least: a house that is a triangle has spikes.
+const LEAST: usize = 4;
+
 impl Outlines {
-    /// Of arcs whose sides differ by so many metres of height.
-    pub fn of(arcs: &[Arc], step: impl Fn(&Arc) -> f64) -> Self {
+    /// Of arcs whose sides differ by `step` metres of height. `lost` is what each cell counts if what
+    /// is inside a closed one is taken for what is outside of it, metres.
+    pub fn of(
+        arcs: &[Arc],
+        step: impl Fn([u32; 2]) -> f64,
+        lost: impl Fn(u32, u32) -> f64,
+    ) -> Self {
+        let all = || arcs.iter().flat_map(|arc| &arc.points);
         let mut outlines = Self {
             positions: Vec::new(),
             next: Vec::new(),
@@ -71,23 +84,31 @@ impl Outlines {
             arc_of: Vec::new(),
             arcs: Vec::new(),
             straight: FxHashSet::default(),
-            squares: FxHashMap::default(),
+            squares: Squares::around(all().copied()),
             collapses: BinaryHeap::new(),
             change: 0.0,
         };
         for arc in arcs {
-            outlines.add(arc, step(arc));
+            let twice = twice_area(&arc.points);
+            let [left, right] = arc.sides;
+            let [inside, outside] = if twice > 0.0 { [left, right] } else { [right, left] };
+            let volume = arc.nodes.is_none().then(|| twice.abs() * 0.5 * lost(inside, outside));
+            outlines.add(arc, step(arc.sides).abs(), volume);
         }
         for vertex in 0..outlines.positions.len() as u32 {
             outlines.index(vertex);
         }
-        for vertex in 0..outlines.positions.len() as u32 {
-            outlines.offer(vertex);
-        }
+        let vertices = 0..outlines.positions.len() as u32;
+        let offers: Vec<Reverse<Collapse>> = vertices
+            .filter_map(|vertex| outlines.offered(vertex))
+            .chain(outlines.arcs.iter().filter_map(State::offered))
+            .map(Reverse)
+            .collect();
+        outlines.collapses = BinaryHeap::from(offers);
         outlines
     }
 
-    fn add(&mut self, arc: &Arc, step: f64) {
+    fn add(&mut self, arc: &Arc, weight: f64, volume: Option<f64>) {
         let first = self.positions.len() as u32;
         let number = self.arcs.len() as u32;
         match arc.nodes {
@@ -121,8 +142,7 @@ impl Outlines {
             ends
         });
         let least = match nodes {
-            // A house that is a triangle has spikes.
-            None => 4,
+            None => LEAST,
             Some([a, b]) if a == b => 2,
             Some(_) => 0,
         };
@@ -132,28 +152,42 @@ impl Outlines {
             least,
             is_closed,
             nodes,
-            weight: step.abs(),
+            weight,
             triangles: 2 + arc.sides.iter().filter(|&&side| side != OPEN).count(),
+            volume,
         });
+    }
+
+    /// Whether an arc is gone as a whole.
+    pub fn is_gone(&self, arc: usize) -> bool {
+        !self.alive[self.arcs[arc].first as usize]
     }
 
     /// Triangles of walls, and those of roofs by their corners: two more than there are for each.
     pub fn triangles(&self) -> usize {
         let segments = |arc: &State| arc.points + usize::from(!arc.is_closed);
-        self.arcs.iter().map(|arc| arc.triangles * segments(arc)).sum()
+        let left = (0..).zip(&self.arcs).filter(|&(number, _)| !self.is_gone(number));
+        left.map(|(_, arc)| arc.triangles * segments(arc)).sum()
     }
 
     /// Collapses until there are at most so many by [`Self::triangles`], as far as borders allow.
     pub fn simplify(&mut self, most: usize) {
         let mut triangles = self.triangles();
         while triangles > most {
-            let Some(Reverse(Collapse { price, vertex, version })) = self.collapses.pop() else {
+            let Some(Reverse(Collapse { price, vertex, version, is_whole })) = self.collapses.pop()
+            else {
                 return;
             };
+            let arc = self.arc_of[vertex as usize] as usize;
+            if is_whole {
+                triangles -= self.arcs[arc].triangles * self.arcs[arc].points;
+                self.change += self.arcs[arc].volume.unwrap_or_default();
+                self.give_up(arc);
+                continue;
+            }
             if self.versions[vertex as usize] != version || !self.alive[vertex as usize] {
                 continue;
             }
-            let arc = self.arc_of[vertex as usize] as usize;
             if self.collapse(vertex) {
                 let saved = self.arcs[arc].triangles;
                 triangles -= saved;
@@ -196,28 +230,38 @@ impl Outlines {
         Some([self.previous[b as usize], b, c, self.next[c as usize]])
     }
 
-    /// Offers the collapse of the segment that starts at a vertex, or of the vertex where it is the
-    /// only one.
-    fn offer(&mut self, vertex: u32) {
+    /// The collapse of the segment that starts at a vertex, or of the vertex where it is the only
+    /// one.
+    fn offered(&self, vertex: u32) -> Option<Collapse> {
         let arc = &self.arcs[self.arc_of[vertex as usize] as usize];
         if arc.points <= arc.least || self.is_end(vertex) {
-            return;
+            return None;
         }
         let displaced = match self.around(vertex) {
-            Some(around) => match replacement(around.map(|v| self.at(v))) {
-                Some((_, displaced)) => displaced,
-                None => return,
-            },
+            Some(around) => replacement(around.map(|v| self.at(v)))?.1,
             None if arc.points == 1 => {
                 let [a, d] = [self.previous[vertex as usize], self.next[vertex as usize]];
                 let [a, b, d] = [a, vertex, d].map(|v| self.at(v));
                 (b - a).perp_dot(d - a).abs() * 0.5
             }
-            None => return,
+            None => return None,
         };
         let price = displaced * arc.weight / arc.triangles as f64;
         let version = self.versions[vertex as usize];
-        self.collapses.push(Reverse(Collapse { price, vertex, version }));
+        Some(Collapse { price, vertex, version, is_whole: false })
+    }
+
+    /// Takes all of a closed arc away.
+    fn give_up(&mut self, arc: usize) {
+        let first = self.arcs[arc].first;
+        let mut vertex = first;
+        loop {
+            self.alive[vertex as usize] = false;
+            vertex = self.next[vertex as usize];
+            if vertex == first {
+                return;
+            }
+        }
     }
 
     /// Does it; false where borders would cross.
@@ -271,24 +315,15 @@ impl Outlines {
 
     /// Offers anew what changes with a vertex.
     fn renew(&mut self, vertex: u32) {
-        let mut near = vec![vertex];
-        let mut back = vertex;
-        for _ in 0..2 {
-            back = self.previous[back as usize];
-            if back == NONE {
-                break;
+        let back = |vertex: u32| if vertex == NONE { NONE } else { self.previous[vertex as usize] };
+        let before = back(vertex);
+        let near = [vertex, before, back(before), self.next[vertex as usize]];
+        for (number, &vertex) in near.iter().enumerate() {
+            if vertex != NONE && !near[..number].contains(&vertex) {
+                self.versions[vertex as usize] += 1;
+                let offered = self.offered(vertex);
+                self.collapses.extend(offered.map(Reverse));
             }
-            near.push(back);
-        }
-        let onward = self.next[vertex as usize];
-        if onward != NONE {
-            near.push(onward);
-        }
-        near.sort_unstable();
-        near.dedup();
-        for vertex in near {
-            self.versions[vertex as usize] += 1;
-            self.offer(vertex);
         }
     }
 
@@ -298,18 +333,22 @@ impl Outlines {
         let all = swept.as_flattened();
         let low = all.iter().fold(DVec2::INFINITY, |low, p| low.min(*p));
         let high = all.iter().fold(DVec2::NEG_INFINITY, |high, p| high.max(*p));
-        for square in squares(low, high) {
-            for &start in self.squares.get(&square).into_iter().flatten() {
+        for square in self.squares.between(low, high) {
+            for &start in &self.squares.starts[square] {
                 let end = self.next[start as usize];
                 if !self.alive[start as usize] || end == NONE {
                     continue;
                 }
                 let [p, q] = [start, end].map(|v| self.at(v));
-                let is_in = |triangle: &[DVec2; 3]| is_within(p, triangle);
+                if p.max(q).cmplt(low).any() || p.min(q).cmpgt(high).any() {
+                    continue;
+                }
                 if !old.contains(&start) && new.iter().any(|&[a, b]| do_cross([a, b], [p, q])) {
                     return false;
                 }
-                if !all.contains(&p) && swept.iter().any(is_in) {
+                let is_near = p.cmpge(low).all() && p.cmple(high).all();
+                let is_in = |triangle: &[DVec2; 3]| is_within(p, triangle);
+                if is_near && !all.contains(&p) && swept.iter().any(is_in) {
                     return false;
                 }
             }
@@ -322,8 +361,8 @@ impl Outlines {
         let end = self.next[vertex as usize];
         if end != NONE {
             let [p, q] = [vertex, end].map(|v| self.at(v));
-            for square in squares(p.min(q), p.max(q)) {
-                let there = self.squares.entry(square).or_default();
+            for square in self.squares.between(p.min(q), p.max(q)) {
+                let there = &mut self.squares.starts[square];
                 if !there.contains(&vertex) {
                     there.push(vertex);
                 }
@@ -332,10 +371,39 @@ impl Outlines {
     }
 }
 
-/// The squares of the index that a rectangle touches.
-fn squares(low: DVec2, high: DVec2) -> impl Iterator<Item = [i32; 2]> {
-    let [low, high] = [low, high].map(|p| (p / SQUARE).floor().as_ivec2());
-    (low.y..=high.y).flat_map(move |y| (low.x..=high.x).map(move |x| [x, y]))
+impl State {
+    /// That it goes as a whole, once it has no more points than it must.
+    fn offered(&self) -> Option<Collapse> {
+        let price = self.volume? / (self.triangles * LEAST) as f64;
+        Some(Collapse { price, vertex: self.first, version: 0, is_whole: true })
+    }
+}
+
+/// The segments by the squares that they touch.
+struct Squares {
+    low: DVec2,
+    size: IVec2,
+    /// Where they start, row by row.
+    starts: Vec<Vec<u32>>,
+}
+
+impl Squares {
+    fn around(points: impl Iterator<Item = DVec2> + Clone) -> Self {
+        let low = points.clone().fold(DVec2::INFINITY, DVec2::min);
+        let high = points.fold(DVec2::NEG_INFINITY, DVec2::max);
+        let size = ((high - low) / SQUARE).floor().as_ivec2().max(IVec2::ZERO) + 1;
+        Self { low, size, starts: vec![Vec::new(); (size.x * size.y) as usize] }
+    }
+
+    /// The squares that a rectangle touches; what is beyond all of them is in the outermost.
+    fn between(&self, low: DVec2, high: DVec2) -> impl Iterator<Item = usize> + use<> {
+        let [low, high] = [low, high].map(|p| {
+            ((p - self.low) / SQUARE).floor().as_ivec2().clamp(IVec2::ZERO, self.size - 1)
+        });
+        let columns = self.size.x;
+        (low.y..=high.y)
+            .flat_map(move |y| (low.x..=high.x).map(move |x| (y * columns + x) as usize))
+    }
 }
 
 /// The point that stands for the second and third of four, so that areas stay where that is near
@@ -460,7 +528,7 @@ mod tests {
             })
             .collect();
         let arcs = arcs(&cells, &Near::of(&cells, &grid, 1), &grid);
-        let mut outlines = Outlines::of(&arcs, |_| 1.0);
+        let mut outlines = Outlines::of(&arcs, |_| 1.0, |_, _| 10.0);
         let before = ring_areas(&arcs, &outlines);
         // Of four corners: two triangles of walls each, and one of the roof.
         outlines.simplify(12);
@@ -472,6 +540,51 @@ mod tests {
             let nearest = points.iter().map(|p| p.distance(corner)).fold(f64::INFINITY, f64::min);
             assert!(nearest < 1.0, "{nearest} cells from {corner}: {points:?}");
         }
+    }
+
+    #[test]
+    fn courtyards_and_towers_go_as_a_whole_the_least_first() {
+        // A block of 30 by 30 cells with courts of 2 by 2, one of 8 by 8, and a tower.
+        let grid = Grid::over(DVec2::splat(3.0), DVec2::splat(37.0), 1.0, 3);
+        let cells: Vec<u32> = (0..grid.cells())
+            .map(|cell| {
+                let (x, y) = (cell % grid.columns, cell / grid.columns);
+                let within = |low: [usize; 2], side: usize| {
+                    (low[0]..low[0] + side).contains(&x) && (low[1]..low[1] + side).contains(&y)
+                };
+                match within([5, 5], 30) {
+                    true if within([20, 20], 8) || within([8, 8], 2) || within([14, 8], 2) => OPEN,
+                    true if within([8, 20], 4) => 1,
+                    true => 0,
+                    false => OPEN,
+                }
+            })
+            .collect();
+        let arcs = arcs(&cells, &Near::of(&cells, &grid, 1), &grid);
+        assert_eq!(arcs.len(), 5);
+        let lost = |inside: u32, outside: u32| match (inside, outside) {
+            (1, 0) => 50.0,
+            (0, OPEN) => 1e3,
+            _ => 10.0,
+        };
+        let left_of = |most: usize| {
+            let mut outlines = Outlines::of(&arcs, |_| 10.0, lost);
+            outlines.simplify(most);
+            assert!(outlines.triangles() <= most);
+            let sides = (0..5).filter(|&arc| !outlines.is_gone(arc));
+            let mut left: Vec<f64> =
+                sides.map(|arc| twice_area(&outlines.points(arc)).abs().round()).collect();
+            left.sort_by(f64::total_cmp);
+            (left, outlines.change)
+        };
+        // Half a cell of each was cut off at its corners. Walls of the tower have two roofs.
+        let [two, one, none] = [40, 24, 12].map(left_of);
+        assert_eq!(two.0, [31.0, 127.0, 1799.0]);
+        assert_eq!(one.0, [127.0, 1799.0]);
+        assert_eq!(none.0, [1799.0]);
+        assert!((one.1 - two.1 - 15.5 * 50.0).abs() < 1e-6, "{two:?} {one:?}");
+        assert!((none.1 - one.1 - 63.5 * 10.0).abs() < 1e-6, "{one:?} {none:?}");
+        assert_eq!(left_of(0).0, [0.0; 0]);
     }
 
     #[test]
@@ -490,7 +603,7 @@ mod tests {
             })
             .collect();
         let arcs = arcs(&cells, &Near::of(&cells, &grid, 1), &grid);
-        let mut outlines = Outlines::of(&arcs, |arc| f64::from(arc.sides[0] % 7 + 1));
+        let mut outlines = Outlines::of(&arcs, |sides| f64::from(sides[0] % 7 + 1), |_, _| 100.0);
         let before = ring_areas(&arcs, &outlines);
         let triangles = outlines.triangles();
         outlines.simplify(triangles / 3);

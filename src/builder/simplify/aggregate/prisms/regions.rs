@@ -9,7 +9,7 @@
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeMap, BinaryHeap};
 
-use glam::{DVec2, dvec2};
+use rustc_hash::FxHashMap;
 
 use super::gaps::{GapCell, gap_cells};
 use super::heights::{Heights, NONE, Near};
@@ -39,30 +39,14 @@ struct Sums {
     covered_squares: f64,
     /// The lowest of its bodies.
     low: f64,
-    /// The cells around it: columns and rows.
-    around: Option<[DVec2; 2]>,
 }
 
 impl Sums {
-    fn add(&mut self, at: DVec2, height: f64, low: f64) {
-        *self = self.and(&Self {
-            cells: 1.0,
-            height,
-            squares: height * height,
-            covered: 1.0,
-            covered_height: height,
-            covered_squares: height * height,
-            low,
-            around: Some([at, at]),
-        });
-    }
-
-    /// How many cells are between the rectangles around two.
-    fn distance(&self, other: &Self) -> f64 {
-        let Some(([low, high], [others_low, others_high])) = self.around.zip(other.around) else {
-            return 0.0;
-        };
-        (low - others_high).max(others_low - high).max(DVec2::ZERO).length()
+    fn add(&mut self, height: f64, low: f64) {
+        self.cells += 1.0;
+        self.height += height;
+        self.squares += height * height;
+        self.low = self.low.min(low);
     }
 
     fn and(&self, other: &Self) -> Self {
@@ -74,10 +58,6 @@ impl Sums {
             covered_height: self.covered_height + other.covered_height,
             covered_squares: self.covered_squares + other.covered_squares,
             low: self.low.min(other.low),
-            around: match (self.around, other.around) {
-                (Some([low, high]), Some([a, b])) => Some([low.min(a), high.max(b)]),
-                (mine, others) => mine.or(others),
-            },
         }
     }
 
@@ -142,8 +122,7 @@ struct Offer {
 }
 
 /// All regions and how they merge.
-pub(super) struct Regions<'a> {
-    heights: &'a Heights,
+pub(super) struct Regions {
     pub near: Near,
     /// Of each cell, at first.
     of_cell: Vec<u32>,
@@ -172,33 +151,30 @@ pub(super) struct Region {
     pub low: f64,
 }
 
-impl<'a> Regions<'a> {
+impl Regions {
     /// `gap` is the width of what may be filled, in cells.
-    pub fn of(heights: &'a Heights, gap: f64, constants: &PrismConstants) -> Self {
+    pub fn of(heights: &Heights, gap: f64, constants: &PrismConstants) -> Self {
         let reach = gap.ceil() as usize + 1;
         let near = Near::of(&heights.body, &heights.grid, reach);
         let of_cell = flat_regions(heights, &near, constants.slope);
         let count = of_cell.iter().filter(|&&region| region != NONE).max().map_or(0, |&n| n + 1);
         let mut first = vec![Sums { low: f64::INFINITY, ..Sums::default() }; count as usize];
-        for (cell, &region) in of_cell.iter().enumerate() {
+        for cell in near.cells.iter().map(|&cell| cell as usize) {
+            let region = of_cell[cell];
             if region != NONE {
                 let (top, low) =
                     (heights.top[cell].into(), heights.lows[heights.body[cell] as usize]);
-                let columns = heights.grid.columns;
-                let at = dvec2((cell % columns) as f64, (cell / columns) as f64);
-                first[region as usize].add(at, top, low);
+                first[region as usize].add(top, low);
             }
         }
+        for sums in &mut first {
+            sums.covered = sums.cells;
+            sums.covered_height = sums.height;
+            sums.covered_squares = sums.squares;
+        }
         let gaps = gap_cells(&of_cell, &near, &heights.grid, gap);
-        let mut regions = Self {
-            heights,
-            near,
-            of_cell,
-            gaps,
-            first,
-            raise: constants.raise,
-            mergings: Vec::new(),
-        };
+        let mut regions =
+            Self { near, of_cell, gaps, first, raise: constants.raise, mergings: Vec::new() };
         regions.mergings = Merger::of(&regions, constants.net).run();
         regions
     }
@@ -243,13 +219,13 @@ impl<'a> Regions<'a> {
             }
         }
         tidy(&mut of_cell, &self.near, least);
+        let left = (0..self.count() as u32).filter(|&number| root[number as usize] == number);
         let region = |region: u32| {
             let Sums { covered, covered_height, covered_squares, low, .. } = sums[region as usize];
             let mean = covered_height / covered;
             let deviation = (covered_squares / covered - mean * mean).max(0.0).sqrt();
             (region, Region { height: mean + self.raise * deviation, low })
         };
-        let left = (0..self.count() as u32).filter(|&number| root[number as usize] == number);
         let regions = left.map(region).collect();
         Labels { of_cell, regions, change }
     }
@@ -285,8 +261,6 @@ fn flat_regions(heights: &Heights, near: &Near, slope: f64) -> Vec<u32> {
 /// The full λ-schedule.
 struct Merger {
     net: f64,
-    /// Of a cell, metres.
-    side: f64,
     sums: Vec<Option<Sums>>,
     contacts: Vec<BTreeMap<u32, Contact>>,
     /// Sides of cells at the open.
@@ -299,16 +273,13 @@ struct Merger {
 impl Merger {
     fn of(regions: &Regions, net: f64) -> Self {
         let count = regions.count();
-        let grid = &regions.heights.grid;
-        let mut contacts: Vec<BTreeMap<u32, Contact>> = vec![BTreeMap::new(); count];
+        let mut pairs: FxHashMap<[u32; 2], Contact> = FxHashMap::default();
         let mut outer = vec![0.0; count];
         let mut add = |a: u32, b: u32, contact: Contact| {
-            for (a, b) in [(a, b), (b, a)] {
-                let known = contacts[a as usize].entry(b).or_default();
-                *known = known.and(&contact);
-            }
+            let known = pairs.entry([a.min(b), a.max(b)]).or_default();
+            *known = known.and(&contact);
         };
-        let mut gap_of = rustc_hash::FxHashMap::default();
+        let mut gap_of = FxHashMap::default();
         for gap in &regions.gaps {
             gap_of.insert(gap.cell, gap.regions);
             let [a, b] = gap.regions;
@@ -332,9 +303,20 @@ impl Merger {
         for (cell, other) in regions.near.sides() {
             side(cell, other);
         }
-        let sums = regions.first.iter().copied().map(Some).collect();
-        let (offers, done) = (BinaryHeap::new(), Vec::new());
-        Self { net, side: grid.side, sums, contacts, outer, versions: vec![0; count], offers, done }
+        let mut contacts: Vec<BTreeMap<u32, Contact>> = vec![BTreeMap::new(); count];
+        for ([a, b], contact) in pairs {
+            contacts[a as usize].insert(b, contact);
+            contacts[b as usize].insert(a, contact);
+        }
+        Self {
+            net,
+            sums: regions.first.iter().copied().map(Some).collect(),
+            contacts,
+            outer,
+            versions: vec![0; count],
+            offers: BinaryHeap::new(),
+            done: Vec::new(),
+        }
     }
 
     fn run(mut self) -> Vec<(Merging, f64)> {
@@ -361,7 +343,7 @@ impl Merger {
         let mut offers = Vec::new();
         let outer = self.outer[region as usize];
         if outer > 0.0 {
-            offers.push((self.given_up(region, &sums) / outer, region));
+            offers.push((self.net * sums.volume() / outer, region));
         }
         for (&other, contact) in &self.contacts[region as usize] {
             let Some(others) = self.sums[other as usize].filter(|_| asked(other)) else { continue };
@@ -376,24 +358,12 @@ impl Merger {
         }
     }
 
-    /// What is changed where a region is given up: its volume, or where all others are farther than
-    /// it is high, that of such a distance.
-    fn given_up(&self, region: u32, sums: &Sums) -> f64 {
-        if self.contacts[region as usize].values().any(|contact| contact.saved() > 0.0) {
-            return self.net * sums.volume();
-        }
-        let others = (0..).zip(&self.sums).filter(|&(other, _)| other != region);
-        let distances = others.filter_map(|(_, other)| Some(sums.distance(other.as_ref()?)));
-        let nearest = distances.fold(f64::INFINITY, f64::min) * self.side;
-        self.net * sums.volume().max(sums.cells * nearest)
-    }
-
     fn merge(&mut self, first: u32, second: u32) {
         let Some(sums) = self.sums[first as usize] else { return };
         if first == second {
+            self.done.push((Merging::Open(first), self.net * sums.volume()));
             self.sums[first as usize] = None;
             self.versions[first as usize] = u32::MAX;
-            self.done.push((Merging::Open(first), self.given_up(first, &sums)));
             let around: Vec<u32> = self.contacts[first as usize].keys().copied().collect();
             for other in around {
                 let contact = self.contacts[other as usize].remove(&first);
@@ -407,7 +377,8 @@ impl Merger {
         let Some(others) = self.sums[second as usize] else { return };
         let contact = self.contacts[first as usize].remove(&second).unwrap_or_default();
         self.done.push((Merging::Regions(first, second), changed(&sums, &others, &contact)));
-        self.sums[first as usize] = Some(with_gap(&sums, &others, &contact));
+        let both = with_gap(&sums, &others, &contact);
+        self.sums[first as usize] = Some(both);
         self.sums[second as usize] = None;
         self.versions[second as usize] = u32::MAX;
         self.versions[first as usize] = self.versions[first as usize].saturating_add(1);
@@ -460,7 +431,7 @@ impl Eq for Offer {}
 
 #[cfg(test)]
 mod tests {
-    use glam::dvec3;
+    use glam::{DVec2, dvec2, dvec3};
 
     use super::super::heights::Grid;
     use super::*;

@@ -1,0 +1,41 @@
+//! What roofs and walls look like.
+
+use crate::mesh::Mesh;
+
+/// What a roof or a wall looks like.
+#[derive(Clone, Copy)]
+pub(super) struct Look {
+    /// A vertex with its material.
+    pub(super) vertex: u32,
+    /// Linear, 0 to 65535.
+    pub(super) color: [f64; 4],
+}
+
+/// What triangles look like on average.
+#[derive(Default)]
+pub(super) struct LookSum {
+    largest: (f64, u32),
+    pub(super) area: f64,
+    color: [f64; 4],
+}
+
+impl LookSum {
+    pub(super) fn add(&mut self, mesh: &Mesh, triangle: [u32; 3], area: f64) {
+        if area > self.largest.0 {
+            self.largest = (area, triangle[0]);
+        }
+        self.area += area;
+        for vertex in triangle {
+            if let Some(color) = mesh.colors.get(vertex as usize) {
+                for (sum, &channel) in self.color.iter_mut().zip(color) {
+                    *sum += f64::from(channel) * area / 3.0;
+                }
+            }
+        }
+    }
+
+    pub(super) fn look(&self) -> Option<Look> {
+        (self.area > 0.0)
+            .then(|| Look { vertex: self.largest.1, color: self.color.map(|sum| sum / self.area) })
+    }
+}
