@@ -2,7 +2,8 @@
 //!
 //! Plain materials are no property of vertices: collapsed with these, a roof's red runs down the
 //! walls. A coarse triangle gets the one colour that covers most of what it stands for: each point
-//! of the original votes for the triangle that is nearest to it.
+//! of the original votes for the triangle that is nearest to it, and counts by how much it faces the
+//! same way, so that the walls of a courtyard that was built over do not colour its roof.
 
 use std::collections::BTreeMap;
 
@@ -15,6 +16,9 @@ use crate::mesh::Mesh;
 
 /// Points of the original that vote, for each coarse triangle, about.
 const POINTS: f64 = 32.0;
+
+/// What does not face the way of a triangle counts for so much, where nothing does.
+const ASIDE: f64 = 0.01;
 
 /// A mesh whose triangles have each the colour of most of the original that is nearest to them, and
 /// its skirts; `None` where the original's colours are not those of faces.
@@ -69,7 +73,7 @@ pub fn with_face_colors(
     Some((painted, skirts.iter().map(of_edge).collect()))
 }
 
-/// By triangle, the area of the original of each look that is nearest to it.
+/// By triangle, the area of the original of each look that is nearest to it and faces its way.
 fn votes(mesh: &Mesh, original: &Original) -> Option<Vec<BTreeMap<Face, f64>>> {
     if mesh.colors.is_empty() {
         return None;
@@ -83,14 +87,23 @@ fn votes(mesh: &Mesh, original: &Original) -> Option<Vec<BTreeMap<Face, f64>>> {
     }
     let area: f64 = original.faces()?.map(|(_, area, _)| area).sum();
     let share = area / (POINTS * mesh.triangles.len() as f64);
+    let corners = |triangle: &[u32; 3]| triangle.map(|v| Vec3::from(mesh.positions[v as usize]));
+    let normals: Vec<Vec3> = mesh.triangles.iter().map(|t| normal(corners(t))).collect();
     for (corners, area, face) in original.faces()? {
         let side = ((area / share).sqrt().ceil() as usize).clamp(1, 64);
+        let (own, each) = (normal(corners), area / (side * side) as f64);
         for point in points(corners, side) {
-            let triangle = nearest(point);
-            *votes[triangle as usize].entry(face).or_insert(0.0) += area / (side * side) as f64;
+            let triangle = nearest(point) as usize;
+            let facing = f64::from(own.dot(normals[triangle]).max(0.0));
+            *votes[triangle].entry(face).or_insert(0.0) += each * (facing * facing).max(ASIDE);
         }
     }
     Some(votes)
+}
+
+/// Of unit length; zero where a triangle has no area.
+fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a).cross(c - a).normalize_or_zero()
 }
 
 /// The centres of the triangles into which one is divided, `side` along each edge.
@@ -184,6 +197,34 @@ mod tests {
         }
         let (painted, _) = with_face_colors(&coarse(), &[], &original(&source)).unwrap();
         assert_eq!(looks(&painted)[..2], [Some(WHITE); 2]);
+    }
+
+    #[test]
+    fn walls_of_a_court_below_do_not_colour_a_roof() {
+        // Of a red sheet a fifth is left, above white walls of ten times its area and a white floor.
+        let mut source = sheet(20, |x| if x < 2.0 { RED } else { WHITE });
+        for (position, color) in source.positions.iter_mut().zip(&source.colors) {
+            position[2] = if *color == RED { 0.0 } else { -3.0 };
+        }
+        for t in &mut source.triangles {
+            if source.colors[t[0] as usize] == WHITE {
+                *t = [t[0], t[2], t[1]];
+            }
+        }
+        for n in 0..20u8 {
+            let (first, x) = (source.positions.len() as u32, 2.0 + f32::from(n) * 0.4);
+            source.positions.extend([[x, 0.0, 0.0], [x, 10.0, 0.0], [x, 5.0, -8.0]]);
+            source.colors.extend([WHITE; 3]);
+            source.materials.extend([0; 3]);
+            source.triangles.push([first, first + 1, first + 2]);
+        }
+        let (painted, _) = with_face_colors(&coarse(), &[], &original(&source)).unwrap();
+        assert_eq!(looks(&painted)[1], Some(RED));
+        // Where nothing faces its way it looks like what there is.
+        let mut turned = sheet(20, |x| if x < 6.0 { RED } else { WHITE });
+        turned.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        let (painted, _) = with_face_colors(&coarse(), &[], &original(&turned)).unwrap();
+        assert_eq!(looks(&painted), [Some(WHITE), Some(RED), Some(RED)]);
     }
 
     #[test]
