@@ -95,7 +95,7 @@ pub fn simplify(
     }
     let mut simplified = nearest(&source, &locked, target, limit, method);
     let reach = constants.simplify.far_part * share(&source.mesh, target);
-    keep_far_parts(&mut simplified, &source, &locked, reach, limit);
+    keep_far_parts(&mut simplified, &source, &locked, reach, limit, method);
     simplified
 }
 
@@ -151,7 +151,7 @@ fn nearest(
         }
         if tries(LadderStep::Oriented) {
             let few = rules.few_faces;
-            candidates.extend(wound(&source, locked, target, weights, reorientable, few));
+            candidates.extend(wound(source, locked, target, weights, reorientable, few));
         }
     }
     // Prisms have no floors, which nobody misses.

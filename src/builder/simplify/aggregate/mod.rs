@@ -41,8 +41,8 @@ pub fn has_many_bodies(mesh: &Mesh, up: UpAxis, target: usize, constants: &Prism
     parts.len() * each > target && parts.iter().filter(is_body).count() * each > target
 }
 
-/// Prisms are made of so many triangles at least.
-const LEAST_TRIANGLES: usize = 16;
+/// Prisms are made of so many triangles at least: those of a box, without its floor.
+const LEAST_TRIANGLES: usize = 10;
 
 /// Replaces the bodies of an untextured `mesh` by prisms, so that about `target` triangles are left
 /// for all if the rest is simplified too; `None` where there are too few bodies to be worth it, or
