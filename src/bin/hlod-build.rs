@@ -163,7 +163,8 @@ struct BuildArgs {
     )]
     origin: Option<OriginArg>,
 
-    /// Quality of JPEG textures, 1-100. From 90 on, colour keeps its full resolution
+    /// Quality of the leaves' JPEG textures, 1-100; those of coarse levels are half as far from 100.
+    /// From 90 on, colour keeps its full resolution
     #[arg(long, value_name = "Q", default_value_t = 85, help_heading = "Textures")]
     jpeg_quality: u8,
     /// Longest side of a node's texture atlas in texels, 16-65535

@@ -145,6 +145,13 @@ impl Surface {
         hits
     }
 
+    /// Visits the triangles whose boxes may meet the box from `low` to `high`, in no order.
+    pub fn in_box(&self, low: DVec3, high: DVec3, mut visit: impl FnMut(u32)) {
+        for square in &self.squares {
+            square.in_box(low, high, &mut visit);
+        }
+    }
+
     /// Visits the triangles that may be within `reach`, near ones first; `visit` may lower it.
     fn search(&self, point: DVec3, mut reach: f64, mut visit: impl FnMut(Hit, &mut f64)) {
         if let [square] = &self.squares[..] {
@@ -179,6 +186,33 @@ impl Square {
         let bvh = build_bvh2(&boxes, BvhBuildParams::very_fast_build(), &mut Default::default());
 
         Self { bvh, members, low, high, slack: (high - low).max_element() * BOX_SLACK }
+    }
+
+    fn in_box(&self, low: DVec3, high: DVec3, visit: &mut impl FnMut(u32)) {
+        let centre = (self.low + self.high) * 0.5;
+        let slack =
+            self.slack + (low - centre).abs().max(high - centre).abs().max_element() * BOX_SLACK;
+        let wanted =
+            Aabb::new((low - centre - slack).as_vec3a(), (high - centre + slack).as_vec3a());
+        let nodes = &self.bvh.nodes;
+        let mut stack = Vec::with_capacity(64);
+        stack.push(0u32);
+        while let Some(number) = stack.pop() {
+            let node = &nodes[number as usize];
+            let bounds = node.aabb;
+            if bounds.min.cmpgt(wanted.max).any() || bounds.max.cmplt(wanted.min).any() {
+                continue;
+            }
+            if node.is_leaf() {
+                let first = node.first_index as usize;
+                for &member in &self.bvh.primitive_indices[first..first + node.prim_count as usize]
+                {
+                    visit(self.members[member as usize]);
+                }
+            } else {
+                stack.extend([node.first_index, node.first_index + 1]);
+            }
+        }
     }
 
     fn search(

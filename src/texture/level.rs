@@ -64,6 +64,10 @@ impl LevelImage {
     /// image its border texels go on.
     pub fn light_at(&self, at: [f64; 2]) -> [f32; 3] {
         let table = color::byte_to_linear();
+        let (pixels, width, offset) = match &self.pixels {
+            Pixels::Source(image, offset) => (&image.pixels[..], image.width as usize, *offset),
+            Pixels::Own(pixels) => (&pixels[..], self.size[0], [0; 2]),
+        };
         let [x, y] = [0, 1].map(|axis| {
             let low = (at[axis] - 0.5).clamp(0.0, self.size[axis] as f64 - 1.0);
             let first = low as usize;
@@ -71,8 +75,9 @@ impl LevelImage {
         });
         let mut light = [0.0; 3];
         for (row, weight) in [(y.0, 1.0 - y.2), (y.1, y.2)] {
+            let start = (row + offset[1]) * width + offset[0];
             for (column, weight) in [(x.0, weight * (1.0 - x.2)), (x.1, weight * x.2)] {
-                let texel = self.row(row, column, 1);
+                let texel = &pixels[(start + column) * self.channels..][..3];
                 for channel in 0..3 {
                     light[channel] += f32::from(table[usize::from(texel[channel])]) * weight;
                 }

@@ -489,7 +489,9 @@ impl<'a> NodeBuilder<'a> {
     }
 
     fn encode(&self, page: &Page, channels: usize) -> Result<NodeImage> {
-        let quality = self.block.options.jpeg_quality;
+        let asked = self.block.options.jpeg_quality;
+        let is_leaf = self.block.steps[self.level] <= 1.0;
+        let quality = if is_leaf { asked } else { encode::coarse_quality(asked) };
         let encoded = encode::encode(&page.pixels, page.size, channels, quality)?;
         Ok(NodeImage {
             width: page.size[0] as u32,

@@ -77,7 +77,9 @@ fn blocks_of_any_size_and_shape() {
     assert_eq!(square(0).built.scene.nodes.len(), 1, "900 triangles are one node");
     let [one, two] = [square(1), square(2)];
     assert_eq!(one.built.scene.level_count(), 2);
-    let few: Bounds = &[("RMS", 0.5), ("stored", 0.5)];
+    // Leaves are cut elsewhere, and what halving the colours of a JPEG leaves depends on where its
+    // pictures begin: 1.48 and 1.41 of 255.
+    let few: Bounds = &[("RMS", 0.5), ("stored", 0.5), ("leaf colour", 0.02)];
     check("901 triangles", &one, &two, "902 triangles", few, "one edge collapses, or two");
 
     let [long, apart] = [1, 10].map(|pieces| chain(&row(pieces), &options()));

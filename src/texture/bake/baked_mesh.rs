@@ -3,6 +3,7 @@
 use rustc_hash::FxHashMap;
 
 use super::flat::flat_charts;
+use super::paint::Away;
 use crate::mesh::Mesh;
 use crate::texture::block::BlockTextures;
 use crate::texture::level::LevelImage;
@@ -39,8 +40,10 @@ impl BlockTextures<'_> {
             images: Vec::with_capacity(charts.len()),
         };
         let mut copies: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+        let mut away = Away::new(source, mesh);
         for (number, chart) in (0u32..).zip(&charts) {
-            let painted = self.paint(source, mesh, chart, chart.scale * factor, level);
+            let scale = chart.scale * factor;
+            let painted = self.paint(source, mesh, chart, scale, level, &mut away);
             for (&triangle, texels) in chart.triangles.iter().zip(&painted.corners) {
                 for (corner, texel) in texels.iter().enumerate() {
                     let vertex = baked.mesh.triangles[triangle as usize][corner];

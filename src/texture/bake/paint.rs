@@ -1,8 +1,11 @@
 //! The image of a flat chart: how many texels it gets, and what each of them shows.
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
 
 use super::flat::{FlatChart, for_centres};
+use super::project::{Projection, Shown, TexelPlane};
 use super::source::{Source, SurfacePoint};
 use crate::color;
 use crate::mesh::{Mesh, wide};
@@ -30,6 +33,17 @@ const LEAST_SCALE: f64 = 0.5;
 /// A triangle of the original that was nearest to the texel before is taken again where the texel
 /// lies over it, farther away by no more than so many texels.
 const SLACK: f64 = 0.5;
+
+/// The original is looked for so many texels farther from a triangle than twice what it is from
+/// the triangle's corners.
+const REACH_TEXELS: f64 = 2.0;
+
+/// Texels beside a triangle that take their colour from its plane, and rounding.
+const BESIDE: f64 = 1.5;
+
+/// Samples along each side of a texel at most: of roots, which are few and seen longest, and of all
+/// others.
+const SAMPLES: [usize; 2] = [4, 2];
 
 /// Times that the scale is fitted to the texels that a node may have.
 const FITS: usize = 4;
@@ -101,6 +115,7 @@ impl BlockTextures<'_> {
         chart: &FlatChart,
         scale: f64,
         level: usize,
+        away: &mut Away,
     ) -> Painted {
         let (corners, size) = chart.on_texels(scale, self.baked_cell(level));
         let [width, height] = size;
@@ -109,30 +124,36 @@ impl BlockTextures<'_> {
         let mut known = BitGrid::new(width, height);
         // Bilinear sampling of the next finer level averages just the texel's own width.
         let finer = (level + 1).min(self.steps.len() - 1);
-        let mut near = None;
+        let samples = self.samples(scale / chart.scale, level);
+        let mut projection = Projection::default();
         let byte = color::linear_to_byte();
-        let to_surface: Vec<TexelToSurface> = chart
-            .triangles
-            .iter()
-            .zip(&corners)
-            .map(|(&triangle, flat)| {
-                TexelToSurface::new(mesh, mesh.triangles[triangle as usize], *flat)
-            })
-            .collect();
-        for y in 0..height {
-            for x in 0..width {
-                let owner = owners[y * width + x];
-                if owner == FREE {
+        let mut near = None;
+        for (number, (&triangle, &flat)) in (0..).zip(chart.triangles.iter().zip(&corners)) {
+            let triangle = mesh.triangles[triangle as usize];
+            let sampled = flat.map(|corner| corner * samples as f64);
+            let plane = TexelPlane::new(mesh, triangle, sampled, BESIDE * samples as f64);
+            if let Some(plane) = &plane {
+                let farthest = triangle.map(|vertex| away.of(vertex, plane.normal));
+                let reach = 2.0 * farthest.into_iter().fold(0.0, f64::max) + REACH_TEXELS / scale;
+                projection.draw(source, plane, reach, size.map(|side| side * samples), &self.steps);
+            }
+            // What has no area in texels, as where the source has none, shows its middle.
+            let [a, b, c] = mesh.corners(triangle);
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            let [columns, rows] = texels_around(flat, size);
+            for (y, x) in rows.flat_map(|y| columns.clone().map(move |x| (y, x))) {
+                if owners[y * width + x] != number {
                     continue;
                 }
-                let to_surface = &to_surface[owner as usize];
-                let point = to_surface.at(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-                let Some(nearest) = source.nearest(point, to_surface.normal, near, SLACK / scale)
-                else {
-                    continue;
+                let drawn = || self.mean_color(source, &projection, [x, y], samples);
+                let mut searched = || {
+                    let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5) * samples as f64;
+                    let point = plane.as_ref().map_or((a + b + c) / 3.0, |plane| plane.at(centre));
+                    near = source.nearest(point, normal, near, SLACK / scale).or(near);
+                    Some(self.color_at(source, near?, finer))
                 };
-                near = Some(nearest);
-                let color = self.color_at(source, nearest, finer);
+                let drawn = plane.as_ref().and_then(|_| drawn());
+                let Some(color) = drawn.or_else(&mut searched) else { continue };
                 pixels[(y * width + x) * 3..][..3]
                     .copy_from_slice(&color.map(|light| byte.of((light * 65535.0) as u16)));
                 known.set(x, y);
@@ -140,6 +161,45 @@ impl BlockTextures<'_> {
         }
         fill::fill_all(&mut pixels, 3, &known);
         Painted { image: LevelImage::own(size, 3, self.steps[level], pixels), corners }
+    }
+
+    /// Samples along each side of a texel of a chart that has so many texels for one of its level.
+    fn samples(&self, factor: f64, level: usize) -> usize {
+        let source_texels = self.steps[level] / factor.max(f64::MIN_POSITIVE);
+        (source_texels.round() as usize).clamp(1, SAMPLES[usize::from(level > 0)])
+    }
+
+    /// The mean of what the samples of a texel show; `None` where they show nothing.
+    fn mean_color(
+        &self,
+        source: &Source,
+        projection: &Projection,
+        [x, y]: [usize; 2],
+        samples: usize,
+    ) -> Option<[f32; 3]> {
+        let (mut sum, mut count) = ([0.0f32; 3], 0u16);
+        for row in y * samples..(y + 1) * samples {
+            for column in x * samples..(x + 1) * samples {
+                if let Some(shown) = projection.at(column, row) {
+                    let centre = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
+                    let color = self.color_of(source, shown, centre);
+                    sum = std::array::from_fn(|channel| sum[channel] + color[channel]);
+                    count += 1;
+                }
+            }
+        }
+        (count > 0).then(|| sum.map(|channel| channel / f32::from(count)))
+    }
+
+    /// What a sample shows of the original, linear light, 0–1.
+    fn color_of(&self, source: &Source, shown: &Shown, centre: DVec2) -> [f32; 3] {
+        let triangle = source.triangle(shown.triangle);
+        let Some(Prepared::Atlas(atlas)) = self.textures.get(triangle.texture as usize) else {
+            return [1.0; 3];
+        };
+        let image = &atlas.levels[shown.level as usize];
+        let color = image.light_at((shown.texel(centre) / image.step).to_array());
+        tinted(color, triangle.colors, || shown.weights(centre))
     }
 
     /// What the original shows at a point, at the level's resolution, linear light, 0–1.
@@ -152,15 +212,50 @@ impl BlockTextures<'_> {
         let along = |axis: usize| {
             (0..3).map(|i| point.weights[i] * f64::from(triangle.texels[i][axis])).sum::<f64>()
         };
-        let mut color = image.light_at([along(0) / image.step, along(1) / image.step]);
-        if let Some(colors) = triangle.colors {
-            for (channel, light) in color.iter_mut().enumerate() {
-                let own =
-                    (0..3).map(|i| point.weights[i] * f64::from(colors[i][channel])).sum::<f64>();
-                *light *= (own / 65535.0) as f32;
-            }
+        let color = image.light_at([along(0) / image.step, along(1) / image.step]);
+        tinted(color, triangle.colors, || point.weights)
+    }
+}
+
+/// A colour multiplied with the vertex colours of a triangle's corners, weighted.
+fn tinted(
+    mut color: [f32; 3],
+    colors: Option<[[u16; 4]; 3]>,
+    weights: impl Fn() -> [f64; 3],
+) -> [f32; 3] {
+    if let Some(colors) = colors {
+        let weights = weights();
+        for (channel, light) in color.iter_mut().enumerate() {
+            let own = (0..3).map(|i| weights[i] * f64::from(colors[i][channel])).sum::<f64>();
+            *light *= (own / 65535.0) as f32;
         }
-        color
+    }
+    color
+}
+
+/// How far the original is from a node's vertices.
+pub(super) struct Away<'a> {
+    source: &'a Source,
+    mesh: &'a Mesh,
+    /// By vertex; negative where nobody has asked yet.
+    known: Vec<f64>,
+    near: Option<SurfacePoint>,
+}
+
+impl<'a> Away<'a> {
+    pub fn new(source: &'a Source, mesh: &'a Mesh) -> Self {
+        Self { source, mesh, known: vec![-1.0; mesh.positions.len()], near: None }
+    }
+
+    /// The distance of a vertex, metres, seen from a triangle that faces this way.
+    fn of(&mut self, vertex: u32, normal: DVec3) -> f64 {
+        let known = &mut self.known[vertex as usize];
+        if *known < 0.0 {
+            let point = wide(self.mesh.positions[vertex as usize]);
+            self.near = self.source.nearest(point, normal, self.near, 0.0).or(self.near);
+            *known = self.near.map_or(0.0, |near| near.distance);
+        }
+        *known
     }
 }
 
@@ -186,6 +281,15 @@ impl FlatChart {
         Rasterizer::default().mark_all(corners.iter().map(|t| t.map(cells)), &mut grid);
         (grid.count() * (cell * cell) as u64) as f64
     }
+}
+
+/// Columns and rows of the texels that may show a triangle with these corners.
+fn texels_around([a, b, c]: [DVec2; 3], size: [usize; 2]) -> [Range<usize>; 2] {
+    let (low, high) = (a.min(b).min(c) - BESIDE, a.max(b).max(c) + BESIDE);
+    [0, 1].map(|axis| {
+        let first = (low[axis].max(0.0) as usize).min(size[axis]);
+        first..(high[axis].ceil().max(0.0) as usize).clamp(first, size[axis])
+    })
 }
 
 /// For each texel the triangle that it shows: the one that its centre lies in, or beside it one
@@ -227,36 +331,4 @@ fn owners(corners: &[[DVec2; 3]], size: [usize; 2]) -> Vec<u32> {
         }
     }
     owners
-}
-
-/// From a chart's texels to its triangle in space.
-struct TexelToSurface {
-    flat: [DVec2; 3],
-    corners: [DVec3; 3],
-    /// One over twice the area in texels; 0 where it has none.
-    inverse: f64,
-    normal: DVec3,
-}
-
-impl TexelToSurface {
-    fn new(mesh: &Mesh, triangle: [u32; 3], flat: [DVec2; 3]) -> Self {
-        let corners = triangle.map(|vertex| wide(mesh.positions[vertex as usize]));
-        let [a, b, c] = flat;
-        let doubled = (b - a).perp_dot(c - a);
-        let inverse = if doubled.abs() > 1e-6 { 1.0 / doubled } else { 0.0 };
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        Self { flat, corners, inverse, normal: normal.normalize_or_zero() }
-    }
-
-    /// The point of the triangle's plane; of a triangle without area its middle.
-    fn at(&self, texel: DVec2) -> DVec3 {
-        let [a, b, c] = self.flat;
-        let [p, q, r] = self.corners;
-        if self.inverse == 0.0 {
-            return (p + q + r) / 3.0;
-        }
-        let v = (texel - a).perp_dot(c - a) * self.inverse;
-        let w = (b - a).perp_dot(texel - a) * self.inverse;
-        p + (q - p) * v + (r - p) * w
-    }
 }

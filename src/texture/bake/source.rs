@@ -103,16 +103,30 @@ impl Source {
                 });
             }
         }
-        let away = |triangle: u32| {
-            let cosine = self.triangles[triangle as usize].normal.dot(normal);
-            if cosine < 0.0 { AWAY } else { 1.0 + ASIDE * (1.0 - cosine) }
-        };
+        let away =
+            |triangle: u32| Self::weight(self.triangles[triangle as usize].normal.dot(normal));
         let hit = self.surface.closest_of(point, near.map(|near| near.triangle), away)?;
         Some(SurfacePoint {
             triangle: hit.triangle,
             weights: hit.weights,
             distance: hit.distance(),
         })
+    }
+
+    /// How many times the distance counts of a triangle whose normal has this cosine with that of
+    /// the surface that looks for it.
+    pub fn weight(cosine: f64) -> f64 {
+        if cosine < 0.0 { AWAY } else { 1.0 + ASIDE * (1.0 - cosine) }
+    }
+
+    /// Visits the triangles whose boxes may meet the box from `low` to `high`, in no order.
+    pub fn in_box(&self, low: DVec3, high: DVec3, visit: impl FnMut(u32)) {
+        self.surface.in_box(low, high, visit);
+    }
+
+    /// Corners of a triangle.
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.surface.corners(triangle)
     }
 
     /// What a triangle shows.
