@@ -9,7 +9,7 @@
 use glam::DVec3;
 
 use super::aggregate::{Extruded, extrude};
-use super::compact::compact;
+use super::compact::with_triangles;
 use super::fallback::fallback_triangles;
 use super::ladder::Method;
 use super::parts::{Part, parts};
@@ -55,8 +55,7 @@ pub fn keep_far_parts(
             return;
         }
         if given_back.iter().all(|other| other.distance(place) > reach) {
-            let part = Mesh { triangles, ..source.mesh.clone() };
-            let (part, border) = compact(&part, &source.border);
+            let (part, border) = with_triangles(&source.mesh, &source.border, &triangles);
             let (mesh, border) = stand_in(part, border, method);
             if simplified.mesh.triangles.len() + mesh.triangles.len() <= limit {
                 given_back.push(place);

@@ -45,6 +45,9 @@ const BESIDE: f64 = 1.5;
 /// others.
 const SAMPLES: [usize; 2] = [4, 2];
 
+/// So many samples are drawn at once, about: half a megabyte.
+const BAND: usize = 1 << 16;
+
 /// Times that the scale is fitted to the texels that a node may have.
 const FITS: usize = 4;
 
@@ -132,31 +135,43 @@ impl BlockTextures<'_> {
             let triangle = mesh.triangles[triangle as usize];
             let sampled = flat.map(|corner| corner * samples as f64);
             let plane = TexelPlane::new(mesh, triangle, sampled, BESIDE * samples as f64);
+            let mut reach = 0.0;
             if let Some(plane) = &plane {
                 let farthest = triangle.map(|vertex| away.of(vertex, plane.normal));
-                let reach = 2.0 * farthest.into_iter().fold(0.0, f64::max) + REACH_TEXELS / scale;
-                projection.draw(source, plane, reach, size.map(|side| side * samples), &self.steps);
+                reach = 2.0 * farthest.into_iter().fold(0.0, f64::max) + REACH_TEXELS / scale;
+                projection.gather(source, plane, reach);
             }
             // What has no area in texels, as where the source has none, shows its middle.
             let [a, b, c] = mesh.corners(triangle);
             let normal = (b - a).cross(c - a).normalize_or_zero();
             let [columns, rows] = texels_around(flat, size);
-            for (y, x) in rows.flat_map(|y| columns.clone().map(move |x| (y, x))) {
-                if owners[y * width + x] != number {
-                    continue;
+            let band = (BAND / (columns.len() * samples * samples).max(1)).max(1);
+            for first in rows.clone().step_by(band) {
+                let rows = first..(first + band).min(rows.end);
+                if let Some(plane) = &plane {
+                    let sampled = [columns.clone(), rows.clone()]
+                        .map(|Range { start, end }| start * samples..end * samples);
+                    projection.draw(source, plane, reach, sampled, &self.steps);
                 }
-                let drawn = || self.mean_color(source, &projection, [x, y], samples);
-                let mut searched = || {
-                    let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5) * samples as f64;
-                    let point = plane.as_ref().map_or((a + b + c) / 3.0, |plane| plane.at(centre));
-                    near = source.nearest(point, normal, near, SLACK / scale).or(near);
-                    Some(self.color_at(source, near?, finer))
-                };
-                let drawn = plane.as_ref().and_then(|_| drawn());
-                let Some(color) = drawn.or_else(&mut searched) else { continue };
-                pixels[(y * width + x) * 3..][..3]
-                    .copy_from_slice(&color.map(|light| byte.of((light * 65535.0) as u16)));
-                known.set(x, y);
+                for (y, x) in rows.flat_map(|y| columns.clone().map(move |x| (y, x))) {
+                    if owners[y * width + x] != number {
+                        continue;
+                    }
+                    let drawn = plane
+                        .as_ref()
+                        .and_then(|_| self.mean_color(source, &projection, [x, y], samples));
+                    let searched = || {
+                        let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5) * samples as f64;
+                        let point =
+                            plane.as_ref().map_or((a + b + c) / 3.0, |plane| plane.at(centre));
+                        near = source.nearest(point, normal, near, SLACK / scale).or(near);
+                        Some(self.color_at(source, near?, finer))
+                    };
+                    let Some(color) = drawn.or_else(searched) else { continue };
+                    pixels[(y * width + x) * 3..][..3]
+                        .copy_from_slice(&color.map(|light| byte.of((light * 65535.0) as u16)));
+                    known.set(x, y);
+                }
             }
         }
         fill::fill_all(&mut pixels, 3, &known);

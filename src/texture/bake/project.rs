@@ -1,6 +1,8 @@
 //! Draws the original onto a coarse triangle along its normal: what lies nearest above or below
 //! each texel, found triangle by triangle as a rasteriser does rather than texel by texel.
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
 
 use super::source::Source;
@@ -83,16 +85,6 @@ impl TexelPlane {
             [beside - inward.dot(from), inward.x, inward.y]
         })
     }
-
-    /// First and end of the columns and rows that it may have texels in.
-    fn texels(&self, size: [usize; 2]) -> [[usize; 2]; 2] {
-        let [a, b, c] = self.flat;
-        let (low, high) = (a.min(b).min(c) - self.beside, a.max(b).max(c) + self.beside);
-        [0, 1].map(|axis| {
-            let first = (low[axis].max(0.0) as usize).min(size[axis]);
-            [first, (high[axis].ceil().max(0.0) as usize).clamp(first, size[axis])]
-        })
-    }
 }
 
 /// What a texel shows: a triangle of the original, and where in its image texel (x, y) of the chart
@@ -121,7 +113,7 @@ impl Shown {
     }
 }
 
-/// The texels in the box of one coarse triangle, and what they show; kept between triangles.
+/// Some texels around one coarse triangle, and what they show; kept between triangles.
 #[derive(Default)]
 pub(super) struct Projection {
     columns: [usize; 2],
@@ -160,22 +152,30 @@ fn span(values: [(f64, f64); 3], [mut from, mut to]: [f64; 2]) -> [f64; 2] {
 const NOTHING: u32 = u32::MAX;
 
 impl Projection {
-    /// Draws what of `source` lies within `reach` of a triangle onto the texels around it, in a chart
-    /// of this `size`. `steps` are source texels a texel, by level, the finest last.
+    /// Gathers what of `source` lies within `reach` of a triangle, to be drawn.
+    pub fn gather(&mut self, source: &Source, plane: &TexelPlane, reach: f64) {
+        self.candidates.clear();
+        let (low, high) = plane.bounds(reach);
+        source.in_box(low, high, |triangle| self.candidates.push(triangle));
+        // Of equally near ones the first is shown, whatever the order of the search.
+        self.candidates.sort_unstable();
+    }
+
+    /// Draws what was gathered for a triangle onto these columns and rows of texels. `steps` are
+    /// source texels a texel, by level, the finest last.
     pub fn draw(
         &mut self,
         source: &Source,
         plane: &TexelPlane,
         reach: f64,
-        size: [usize; 2],
+        texels: [Range<usize>; 2],
         steps: &[f64],
     ) {
-        [self.columns, self.rows] = plane.texels(size);
+        [self.columns, self.rows] = texels.map(|Range { start, end }| [start, end]);
         let count = [self.columns, self.rows].map(|[first, end]| end - first);
         self.nearest.clear();
         self.nearest.resize(count[0] * count[1], (f32::INFINITY, NOTHING));
         self.shown.clear();
-        self.candidates.clear();
         let sides = plane.sides();
         self.spans.clear();
         for y in self.rows[0]..self.rows[1] {
@@ -183,10 +183,6 @@ impl Projection {
             let row = sides.map(|[at, x, slope]| (at + slope * (y as f64 + 0.5), x));
             self.spans.push(span(row, [first, end - 1.0]));
         }
-        let (low, high) = plane.bounds(reach);
-        source.in_box(low, high, |triangle| self.candidates.push(triangle));
-        // Of equally near ones the first is shown, whatever the order of the search.
-        self.candidates.sort_unstable();
         for index in 0..self.candidates.len() {
             let number = self.candidates[index];
             self.draw_one(source, number, plane, &sides, reach, steps);
@@ -355,7 +351,10 @@ mod tests {
         }
         let reach = 0.7;
         let mut projection = Projection::default();
-        projection.draw(&source, &plane, reach, [40, 40], &[8.0, 4.0, 2.0, 1.0]);
+        let [columns, rows] = [0..40, 0..40];
+        let texels = [columns.clone(), rows.clone()];
+        projection.gather(&source, &plane, reach);
+        projection.draw(&source, &plane, reach, texels, &[8.0, 4.0, 2.0, 1.0]);
         let [columns, rows] = [projection.columns, projection.rows].map(|[first, end]| first..end);
         let (mut shown, mut empty, mut beside) = (0, 0, 0);
         for (y, x) in rows.flat_map(|y| columns.clone().map(move |x| (y, x))) {

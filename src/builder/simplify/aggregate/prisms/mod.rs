@@ -133,9 +133,12 @@ impl Walls<'_> {
         }
         let mut roofed = FxHashSet::default();
         for (&number, region) in &self.labels.regions {
-            let rings = by_region.get(&number).map_or(&[][..], Vec::as_slice);
+            // What is nothing but a gap, its bodies gone as crumbs, has no look.
+            let Some((rings, look)) = by_region.get(&number).zip(looks.get(&number)) else {
+                continue;
+            };
             for polygon in polygons(rings) {
-                self.roof(&mut result, &polygon, region.height, looks[&number].roof);
+                self.roof(&mut result, &polygon, region.height, look.roof);
                 roofed.insert(number);
             }
         }

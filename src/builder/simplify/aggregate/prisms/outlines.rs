@@ -372,7 +372,7 @@ impl Outlines {
 }
 
 impl State {
-    /// That it goes as a whole, once it has no more points than it must.
+    /// That it goes as a whole, at the price for a triangle of those that it then has at least.
     fn offered(&self) -> Option<Collapse> {
         let price = self.volume? / (self.triangles * LEAST) as f64;
         Some(Collapse { price, vertex: self.first, version: 0, is_whole: true })
