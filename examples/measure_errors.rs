@@ -38,6 +38,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut chunks = Vec::new();
         divide(mesh, most.parse()?, &mut chunks);
         let reorientable = vec![false; model.materials.len()];
+        let extrudable: Vec<bool> =
+            model.materials.iter().map(|material| material.texture.is_none()).collect();
         for ratio in [4, 16, 64] {
             let constants = Constants::default();
             let method = Method {
@@ -45,6 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 weights: AppearanceWeights::default(),
                 up: model.up.unwrap_or(UpAxis::Z),
                 reorientable: &reorientable,
+                extrudable: &extrudable,
                 without: None,
                 constants: &constants,
             };

@@ -20,6 +20,7 @@ use crate::builder::emit::disk_sink::{DiskSink, NodeRecord};
 use crate::builder::hierarchy::{BlockBuilder, HierarchyOptions, Resolutions, Tree};
 use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
+use crate::builder::simplify::aggregate::{BodyRules, Extrudable};
 use crate::builder::simplify::orient::reorientable;
 use crate::builder::stages::{Stage, Stages};
 use crate::builder::stitch::{Stitch, stitches};
@@ -149,10 +150,15 @@ pub fn build_input(
     let kind = |part: &Part| classes.of(part.material).or_else(|| plain(part));
     let kinds = model.parts.iter().map(kind).collect();
     let stitches = stages.time(Stage::Gather, || stitches(&model.parts, kinds, &constants.stitch));
-    let plans = plan(&model, options.blocks, *desired_tris, up, &stitches, &constants.blocks);
+    let extrudable = Extrudable::new(model.materials.len(), |m| !is_plain(&m), &classes);
+    // Where textures are many and small enough to keep a root from being what it should, they are
+    // baked anew.
+    let rules =
+        BodyRules { up, extrudable: extrudable.materials(true), constants: &constants.prisms };
+    let plans = plan(&model, options.blocks, *desired_tris, &stitches, &constants.blocks, &rules);
     let stitched_edges = stitches.len() as u64;
     let (stitches, across) = by_plan(&plans, stitches, model.parts.len());
-    let drafts = drafts(&mut model, plans, stitches, options, stages);
+    let drafts = drafts(&mut model, plans, stitches, options, &rules, stages);
     let lattice_of = |drafts: &mut dyn Iterator<Item = &Draft>| {
         let fine = lattice_of(drafts);
         if let Some(Quantization { step }) = quantization.filter(|coarse| coarse.step < fine.step) {
@@ -252,6 +258,7 @@ pub fn build_input(
             quantization,
             up,
             reorientable: &reorientable,
+            extrudable: &extrudable,
             sink: &sink,
             stages,
         };
@@ -298,6 +305,7 @@ fn drafts(
     plans: Vec<BlockPlan>,
     stitches: Vec<Vec<Stitch>>,
     options: &BuildOptions,
+    rules: &BodyRules,
     stages: &Stages,
 ) -> Vec<Draft> {
     let mut parts: Vec<Option<Part>> =
@@ -316,9 +324,8 @@ fn drafts(
         false => FxHashSet::default(),
     };
     let materials = &model.materials;
-    let drafts_of = |((plan, parts), stitches)| {
-        drafts_of_plan(materials, plan, parts, stitches, &shared, options, stages)
-    };
+    let drafting = Drafting { materials, shared: &shared, options, rules, stages };
+    let drafts_of = |((plan, parts), stitches)| drafting.drafts(plan, parts, stitches);
     let drafts: Vec<Vec<Draft>> = planned.into_par_iter().zip(stitches).map(drafts_of).collect();
     drafts.into_iter().flatten().collect()
 }
@@ -333,56 +340,69 @@ fn shared_by_parts(planned: &[(BlockPlan, Vec<Part>)]) -> FxHashSet<PositionKey<
     shared_positions(&bounds, positions)
 }
 
-fn drafts_of_plan(
-    materials: &[Material],
-    BlockPlan { name, divide: division, .. }: BlockPlan,
-    parts: Vec<Part>,
-    stitches: Vec<Stitch>,
-    shared: &FxHashSet<PositionKey<f64>>,
-    options: &BuildOptions,
-    stages: &Stages,
-) -> Vec<Draft> {
-    let mut drafts = Vec::new();
-    let stray = stages.time(Stage::Gather, || set_outliers_aside(&parts));
-    let (parts, far) = stray.unwrap_or((parts, Vec::new()));
-    if !far.is_empty() {
-        let name = format!("{name} (far off)");
-        let materials = materials_of(far.iter().map(|part| part.material).collect());
-        drafts.push(Draft {
-            name,
-            far: true,
-            source: DraftSource::Parts(far, Vec::new()),
-            materials,
-        });
+/// What dividing a plan needs to know.
+struct Drafting<'a> {
+    materials: &'a [Material],
+    /// Positions that several plans use.
+    shared: &'a FxHashSet<PositionKey<f64>>,
+    options: &'a BuildOptions,
+    rules: &'a BodyRules<'a>,
+    stages: &'a Stages,
+}
+
+impl Drafting<'_> {
+    fn drafts(&self, plan: BlockPlan, parts: Vec<Part>, stitches: Vec<Stitch>) -> Vec<Draft> {
+        let &Self { materials, shared, options, rules, stages } = self;
+        let BlockPlan { name, divide: division, .. } = plan;
+        let mut drafts = Vec::new();
+        let stray = stages.time(Stage::Gather, || set_outliers_aside(&parts));
+        let (parts, far) = stray.unwrap_or((parts, Vec::new()));
+        if !far.is_empty() {
+            let name = format!("{name} (far off)");
+            let materials = materials_of(far.iter().map(|part| part.material).collect());
+            drafts.push(Draft {
+                name,
+                far: true,
+                source: DraftSource::Parts(far, Vec::new()),
+                materials,
+            });
+        }
+        if division == Division::Whole {
+            let materials = materials_of(parts.iter().map(|part| part.material).collect());
+            let source = DraftSource::Parts(parts, stitches);
+            drafts.push(Draft { name, far: false, source, materials });
+            return drafts;
+        }
+        let mut chunk = stages.time(Stage::Gather, || gather(materials, &parts, &stitches));
+        drop(stitches);
+        drop(parts);
+        keep_shared(&mut chunk, shared);
+        chunk.moved = options.quantize.map(|_| vec![0.0; chunk.mesh.positions.len()]);
+        let most = match division {
+            Division::Halves(most) => {
+                let bodies = stages.time(Stage::Gather, || rules.crowd(&chunk.mesh)).max(1);
+                let share = most.bodies as f64 / bodies as f64;
+                most.triangles.min((chunk.mesh.triangles.len() as f64 * share) as usize)
+            }
+            Division::Whole | Division::Grid { .. } => chunk.mesh.triangles.len(),
+        };
+        // The blocks' own factors are not known yet; those of the largest serve all.
+        let resolutions =
+            Resolutions::new(most.min(chunk.mesh.triangles.len()), &options.hierarchy);
+        let shares: Vec<f64> =
+            resolutions.factors().iter().map(|factor| 1.0 / factor.sqrt()).collect();
+        let constants = &options.hierarchy.constants;
+        let chunks =
+            divide(chunk, division, &shares, options.quantization(), constants, rules, stages);
+        let several = chunks.len() > 1;
+        for (number, chunk) in chunks.into_iter().enumerate() {
+            let materials = materials_of(chunk.mesh.materials.clone());
+            let name = if several { format!("{name} {}", number + 1) } else { name.clone() };
+            let source = DraftSource::Chunk(Box::new(chunk));
+            drafts.push(Draft { name, far: false, source, materials });
+        }
+        drafts
     }
-    if division == Division::Whole {
-        let materials = materials_of(parts.iter().map(|part| part.material).collect());
-        let source = DraftSource::Parts(parts, stitches);
-        drafts.push(Draft { name, far: false, source, materials });
-        return drafts;
-    }
-    let mut chunk = stages.time(Stage::Gather, || gather(materials, &parts, &stitches));
-    drop(stitches);
-    drop(parts);
-    keep_shared(&mut chunk, shared);
-    chunk.moved = options.quantize.map(|_| vec![0.0; chunk.mesh.positions.len()]);
-    let most = match division {
-        Division::Halves { most } => most,
-        Division::Whole | Division::Grid { .. } => chunk.mesh.triangles.len(),
-    };
-    // The blocks' own factors are not known yet; those of the largest serve all.
-    let resolutions = Resolutions::new(most.min(chunk.mesh.triangles.len()), &options.hierarchy);
-    let shares: Vec<f64> = resolutions.factors().iter().map(|factor| 1.0 / factor.sqrt()).collect();
-    let constants = &options.hierarchy.constants;
-    let chunks = divide(chunk, division, &shares, options.quantization(), constants, stages);
-    let several = chunks.len() > 1;
-    for (number, chunk) in chunks.into_iter().enumerate() {
-        let materials = materials_of(chunk.mesh.materials.clone());
-        let name = if several { format!("{name} {}", number + 1) } else { name.clone() };
-        let source = DraftSource::Chunk(Box::new(chunk));
-        drafts.push(Draft { name, far: false, source, materials });
-    }
-    drafts
 }
 
 /// Each material once.

@@ -227,6 +227,10 @@ pub struct PrismConstants {
     pub triangles_per_body: usize,
     /// Where it leaves fewer than this, nothing else is tried, 0 or more.
     pub sure: f64,
+    /// Blocks are divided until their roots have at least so many for each body, 0 or more, where
+    /// each of several side by side counts half: with fewer they leave out more than a tenth of the
+    /// ground that is covered.
+    pub least_per_body: f64,
     /// Cells along the side of a square as large as the footprints have for each triangle, over 0.
     pub resolution: f64,
     /// Gaps may be filled that are at most so many times as wide as that square, 0 or more.
@@ -257,6 +261,7 @@ impl Default for PrismConstants {
             cells: 1 << 20,
             triangles_per_body: 16,
             sure: 4.0,
+            least_per_body: 6.0,
             resolution: 5.0,
             gap: 2.0,
             net: 10.0,

@@ -9,7 +9,7 @@
 //! | `appearance` | leaves' texels; colours and tiles of every level |
 //! | `distance` | each level against the source |
 //! | `node_errors`, `errors` | each node against the leaves below it; stored against measured errors |
-//! | `seams`, `cut_planes`, `border`, `gaps` | what shows where two levels meet |
+//! | `seams`, `cut_planes`, `border`, `gaps`, `slits` | what shows where two levels meet |
 //!
 //! Without a source the leaves stand for it, and what needs it is not checked. Triangles of all
 //! nodes are kept in memory (some 30 bytes each), and the source with its search tree (some 150
@@ -39,6 +39,7 @@ mod progress;
 mod report;
 mod sample;
 mod seams;
+mod slits;
 mod source;
 mod source_colors;
 mod step;
@@ -98,6 +99,7 @@ pub fn verify(
         errors: Vec::new(),
         worst_nodes: Vec::new(),
         gaps: Vec::new(),
+        slits: Vec::new(),
     };
     let path = out.join(SCENE_FILE);
     let bytes = std::fs::read(&path)
@@ -175,17 +177,19 @@ impl Verification<'_> {
             report,
         );
         drop(source);
+        let open = rims.open();
         let (figures, check) = gaps::gaps(
             scene,
             &geometry,
             &seams,
-            &rims.open(),
+            &open,
             &step::fine_steps(scene),
             &options.limits,
             progress,
         );
         report.gaps = figures;
         report.checks.push(check);
+        report.slits = slits::slits(scene, &geometry, &open, progress);
         Ok(())
     }
 

@@ -40,6 +40,9 @@ pub struct VerifyReport {
     pub worst_nodes: Vec<NodeFigures>,
     /// Widest gaps, for every pair of levels that meet somewhere; `a` ≤ `b`.
     pub gaps: Vec<GapFigures>,
+    /// Slits between borders of the source that touch without sharing vertices, for every pair of
+    /// levels that meet so somewhere; `a` ≤ `b`.
+    pub slits: Vec<SlitFigures>,
 }
 
 impl VerifyReport {
@@ -264,6 +267,26 @@ pub struct NodeFigures {
     pub to_source: Distance,
     /// Where the largest distance is, in source coordinates.
     pub farthest: [f64; 3],
+}
+
+/// Slits between nodes of two levels, or within nodes of one, where borders of the source touch
+/// without sharing vertices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct SlitFigures {
+    /// Level on one side.
+    pub a: u32,
+    /// Level on the other.
+    pub b: u32,
+    /// Places where the source's borders touch.
+    pub points: u64,
+    /// Of these, those where the nodes are no farther apart than the source is.
+    pub closed: u64,
+    /// The source's widest slit there, metres.
+    pub widest_in_source: f64,
+    /// What 99 of 100 slits are narrower than, metres.
+    pub p99: f64,
+    /// The widest, metres.
+    pub widest: f64,
 }
 
 /// Widest gaps between nodes of two levels that meet at a cut.

@@ -112,6 +112,25 @@ pub fn text(report: &VerifyReport) -> String {
             ));
         }
     }
+    if !report.slits.is_empty() {
+        line(format!(
+            "\nSlits where borders of the source touch without sharing vertices\n{:>7} {:>10} {:>9} {:>14} {:>10} {:>10}",
+            "levels", "places", "closed", "in source m", "99 % m", "widest m"
+        ));
+        for slit in &report.slits {
+            let closed = slit.closed as f64 / slit.points.max(1) as f64;
+            line(format!(
+                "{:>3} | {:<1} {:>10} {:>7.1} % {:>14.4} {:>10.4} {:>10.4}",
+                slit.a,
+                slit.b,
+                slit.points,
+                100.0 * closed,
+                slit.widest_in_source,
+                slit.p99,
+                slit.widest
+            ));
+        }
+    }
     line(String::new());
     for check in &report.checks {
         line(format!("{}  {}: {}", verdict(check.passed), check.name, check.summary));

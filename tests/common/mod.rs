@@ -10,6 +10,7 @@ use hlod::builder::cut::split::Chunk;
 use hlod::builder::hierarchy::{
     BlockBuilder, HierarchyOptions, NodeDraft, NodeSink, Resolutions, Tree,
 };
+use hlod::builder::simplify::Extrudable;
 use hlod::builder::simplify::simplified::LadderStep;
 use hlod::lattice::Lattice;
 use hlod::mesh::{Mesh, PositionKey, key};
@@ -225,6 +226,7 @@ pub fn build_baked(
         quantization: None,
         up: hlod::mesh::UpAxis::Z,
         reorientable: &[true; 8],
+        extrudable: &Extrudable::default(),
         sink: &sink,
         stages: &Default::default(),
     };

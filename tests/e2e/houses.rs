@@ -52,10 +52,16 @@ fn town(folder: &Path, halls: usize) {
     write(folder, "town.obj", text);
 }
 
+/// Builds the town in a folder as one block.
+fn build_as_one(folder: &Path) {
+    let options = ["--quiet", "--desired-tris", "300", "--blocks", "groups"];
+    run_build(folder, &[&options[..], &["town.obj", "out"]].concat());
+}
+
 fn built(halls: usize) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     town(folder.path(), halls);
-    run_build(folder.path(), &["--quiet", "--desired-tris", "300", "town.obj", "out"]);
+    build_as_one(folder.path());
     folder
 }
 
@@ -107,7 +113,7 @@ fn painted(folder: &Path) {
 fn no_triangle_goes_from_one_material_to_another() {
     let folder = tempfile::tempdir().unwrap();
     painted(folder.path());
-    run_build(folder.path(), &["--quiet", "--desired-tris", "300", "town.obj", "out"]);
+    build_as_one(folder.path());
     let built = Built::read(&folder.path().join("out"));
     let colors = |node: usize| -> BTreeSet<BTreeSet<[u16; 4]>> {
         let of_primitive = |primitive: &hlod::format::Primitive| {
@@ -126,5 +132,63 @@ fn no_triangle_goes_from_one_material_to_another() {
         let found = colors(node);
         assert!(found.is_subset(&palette), "node {node}: {found:?}");
         assert_eq!(found.len(), 2, "node {node} has roofs and walls");
+    }
+}
+
+/// The same with a patch of one picture for each face.
+fn textured(folder: &Path) {
+    town(folder, 0);
+    let text = std::fs::read_to_string(folder.join("town.obj")).unwrap();
+    let mut lines = vec!["mtllib town.mtl".to_owned()];
+    let mut face = 0;
+    for line in text.lines() {
+        let Some(corners) = line.strip_prefix("f ") else {
+            lines.push(line.to_owned());
+            continue;
+        };
+        let mut textured = "f".to_owned();
+        for (number, corner) in corners.split(' ').enumerate() {
+            let (column, row) = (face % 105, face / 105);
+            let [u, v] = [[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.5, 0.9], [0.1, 0.9]][number];
+            let [u, v] = [(f64::from(column) + u) / 105.0, 1.0 - (f64::from(row) + v) / 105.0];
+            lines.push(format!("vt {u:.5} {v:.5}"));
+            write!(textured, " {corner}/-{}", corners.split(' ').count() - number).unwrap();
+        }
+        lines.push(textured);
+        face += 1;
+    }
+    // All corners of a face come before it.
+    lines.insert(1, "usemtl town".to_owned());
+    write(folder, "town.obj", lines.join("\n"));
+    write(folder, "town.mtl", "newmtl town\nmap_Kd town.png\n");
+    let color = |x, y| image::Rgb([(x / 8 * 2) as u8, (y / 8 * 2) as u8, 90]);
+    image::RgbImage::from_fn(840, 840, color).save(folder.join("town.png")).unwrap();
+}
+
+/// Roots of 300 triangles can stand for fifty houses that stand alone, not for fifteen hundred.
+#[test]
+fn blocks_have_as_many_houses_as_their_root_can_stand_for() {
+    for write_town in [|folder: &Path| town(folder, 0), textured] {
+        let folder = tempfile::tempdir().unwrap();
+        write_town(folder.path());
+        run_build(folder.path(), &["--quiet", "--desired-tris", "300", "town.obj", "out"]);
+        let out = folder.path().join("out");
+        let built = Built::read(&out);
+        let mut houses = 0;
+        for root in (0..built.meshes.len()).filter(|&node| built.scene.nodes[node].level == 0) {
+            let triangles: u32 =
+                built.leaves_below(root).iter().map(|&l| built.scene.nodes[l].triangles).sum();
+            // Where they stand side by side, for twice as many.
+            assert!(triangles <= 100 * 16, "{triangles}");
+            assert!(built.is_leaf(root) || built.scene.nodes[root].triangles <= 330);
+            houses += triangles / 16;
+        }
+        assert_eq!(houses, 1500, "none is cut");
+        let options = VerifyOptions { samples: 20_000, ..VerifyOptions::default() };
+        let report = verify(&out, &[folder.path().join("town.obj")], &options, &Silent).unwrap();
+        let failed: Vec<_> = report.checks.iter().filter(|check| !check.passed).collect();
+        assert!(failed.is_empty(), "{failed:?}");
+        let kept = &report.levels[0].kept;
+        assert!(kept.area.unwrap() > 0.9 && kept.skyline.unwrap() > 0.9, "{kept:?}");
     }
 }

@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::builder::blocks::block_plan::Division;
+use crate::builder::blocks::block_plan::{BlockSize, Division};
 use crate::builder::border::chain::{Chain, CutPlane, KeepRule};
 use crate::builder::border::vertex::{Border, Path};
 use crate::builder::constants::Constants;
 use crate::builder::cut::plane::{Region, best_plane};
 use crate::builder::cut::split::{Chunk, Cut, CutTolerance, cut};
 use crate::builder::cut::uncut::UncutComponents;
+use crate::builder::simplify::aggregate::BodyRules;
 use crate::builder::stages::{Stage, Stages};
 use crate::builder::stitch::Stitch;
 use crate::lattice::Lattice;
@@ -125,6 +126,7 @@ pub fn divide(
     shares: &[f64],
     quantization: Option<Quantization>,
     constants: &Constants,
+    rules: &BodyRules,
     stages: &Stages,
 ) -> Vec<Chunk<f64>> {
     let lattice = quantization.map(|Quantization { step }| Lattice { step });
@@ -139,7 +141,10 @@ pub fn divide(
     let mut done = Vec::new();
     match division {
         Division::Whole => done.push(chunk),
-        Division::Halves { most } => return halves(chunk, most, &rule, lattice, constants, stages),
+        Division::Halves(most) => {
+            let halving = Halving { most, keep: &rule, lattice, constants, rules, stages };
+            return halving.halves(chunk);
+        }
         Division::Grid { metres, axes } => {
             let mut stack = vec![chunk];
             while let Some(chunk) = stack.pop() {
@@ -165,37 +170,52 @@ pub fn divide(
     done
 }
 
-/// Halves a chunk ([`crate::builder::cut::axis`]) until no part of it has more than `most` triangles.
-fn halves(
-    chunk: Chunk<f64>,
-    most: usize,
-    rule: &KeepRule,
+/// How chunks are halved.
+struct Halving<'a> {
+    most: BlockSize,
+    keep: &'a KeepRule<'a>,
     lattice: Option<Lattice>,
-    constants: &Constants,
-    stages: &Stages,
-) -> Vec<Chunk<f64>> {
-    let triangles = chunk.mesh.triangles.len();
-    if triangles == 0 {
-        return Vec::new();
-    }
-    let Some((low, high)) = chunk.mesh.bounds().filter(|_| triangles > most) else {
-        return vec![chunk];
-    };
-    let region = Region { low, high, share: 0.5, touching: 0.0 };
-    let plane = stages.time(Stage::Gather, || best_plane(&chunk.mesh, &region, &constants.cut));
-    let Some((axis, middle)) = plane.filter(|_| chunk.path.len() < 12) else { return vec![chunk] };
-    let middle = lattice.map_or(middle, |lattice| lattice.round(middle));
-    let width = (high[axis] - low[axis]) * 0.5;
-    let whole = UncutComponents::in_slabs(width, most / constants.blocks.uncut, &constants.cut);
-    let (below, above) =
-        stages.time(Stage::Gather, || cut_at(chunk, axis, middle, whole, rule, lattice));
-    let (mut done, above) = rayon::join(
-        || halves(below, most, rule, lattice, constants, stages),
-        || halves(above, most, rule, lattice, constants, stages),
-    );
-    done.extend(above);
-    done
+    constants: &'a Constants,
+    rules: &'a BodyRules<'a>,
+    stages: &'a Stages,
 }
+
+impl Halving<'_> {
+    /// Halves a chunk ([`crate::builder::cut::axis`]) until no part of it is too large.
+    fn halves(&self, chunk: Chunk<f64>) -> Vec<Chunk<f64>> {
+        let &Self { most, lattice, constants, stages, .. } = self;
+        if chunk.mesh.triangles.is_empty() {
+            return Vec::new();
+        }
+        let is_too_large = || stages.time(Stage::Gather, || self.is_too_large(&chunk.mesh));
+        let Some((low, high)) = chunk.mesh.bounds().filter(|_| is_too_large()) else {
+            return vec![chunk];
+        };
+        let region = Region { low, high, share: 0.5, touching: 0.0 };
+        let plane = stages.time(Stage::Gather, || best_plane(&chunk.mesh, &region, &constants.cut));
+        let plane = plane.filter(|_| chunk.path.len() < MOST_HALVINGS);
+        let Some((axis, middle)) = plane else { return vec![chunk] };
+        let middle = lattice.map_or(middle, |lattice| lattice.round(middle));
+        let width = (high[axis] - low[axis]) * 0.5;
+        let uncut = most.triangles / constants.blocks.uncut;
+        let whole = UncutComponents::in_slabs(width, uncut, &constants.cut);
+        let (below, above) =
+            stages.time(Stage::Gather, || cut_at(chunk, axis, middle, whole, self.keep, lattice));
+        let (mut done, above) = rayon::join(|| self.halves(below), || self.halves(above));
+        done.extend(above);
+        done
+    }
+
+    fn is_too_large(&self, mesh: &Mesh<f64>) -> bool {
+        let triangles = mesh.triangles.len();
+        let count = || self.rules.crowd(mesh);
+        triangles > self.most.triangles
+            || triangles > self.most.bodies && count() > self.most.bodies
+    }
+}
+
+/// A block is not halved more often.
+const MOST_HALVINGS: usize = 12;
 
 fn cut_at(
     chunk: Chunk<f64>,

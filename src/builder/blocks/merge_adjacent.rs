@@ -8,20 +8,20 @@
 
 use std::collections::BTreeMap;
 
-use crate::builder::blocks::block_plan::{BlockPlan, Division};
+use crate::builder::blocks::block_plan::{BlockPlan, BlockSize, Division};
 use crate::builder::border::shared::{Bounds, bounds_of, each_shared};
 use crate::builder::stitch::Stitch;
 use crate::mesh::{Model, Part};
 
 /// Joins the plans that have more than `most` vertices in common with others, or as many `stitches`
-/// to them, each with the plan that it has most in common with, until none has. The results have at
-/// most `triangles` triangles or as many as the largest of those joined, cut if need be.
+/// to them, each with the plan that it has most in common with, until none has. The results are at
+/// most as large as `limit` or as the largest of those joined, cut if need be.
 pub fn merge_adjacent(
     model: &Model,
     plans: Vec<BlockPlan>,
     stitches: &[Stitch],
     most: usize,
-    triangles: usize,
+    limit: BlockSize,
 ) -> Vec<BlockPlan> {
     let mut shared: BTreeMap<[usize; 2], usize> = BTreeMap::new();
     let positions =
@@ -43,15 +43,18 @@ pub fn merge_adjacent(
         sets.entry(set).or_default().push(plan);
     }
     let size = |plan: &BlockPlan| match plan.divide {
-        Division::Halves { most } => most,
-        _ => parts_of(model, plan).map(|part| part.indices.len() / 3).sum(),
+        Division::Halves(most) => most,
+        _ => {
+            let triangles = parts_of(model, plan).map(|part| part.indices.len() / 3).sum();
+            BlockSize { triangles, bodies: 0 }
+        }
     };
     let together = |plans: Vec<BlockPlan>| {
-        let most = plans.iter().map(size).fold(triangles, usize::max);
+        let most = plans.iter().map(size).fold(limit, BlockSize::max);
         plans.into_iter().reduce(|mut all, plan| {
             all.parts.extend(plan.parts);
             all.parts.sort_unstable();
-            all.divide = Division::Halves { most };
+            all.divide = Division::Halves(most);
             all
         })
     };
@@ -156,16 +159,17 @@ mod tests {
             divide: Division::Whole,
         };
         let plans: Vec<BlockPlan> = (0..4).map(plan).collect();
+        let limit = |triangles: usize| BlockSize { triangles, bodies: usize::MAX };
         // 41 vertices on each of three lines; the inner groups have two.
-        assert_eq!(merge_adjacent(&model, plans.clone(), &[], 82, 1), plans);
-        let two = merge_adjacent(&model, plans.clone(), &[], 81, 1);
+        assert_eq!(merge_adjacent(&model, plans.clone(), &[], 82, limit(1)), plans);
+        let two = merge_adjacent(&model, plans.clone(), &[], 81, limit(1));
         assert_eq!(two.len(), 2, "both inner groups with the first: {two:?}");
         assert_eq!(two[1], plans[3]);
-        let one = merge_adjacent(&model, plans.clone(), &[], 40, 300);
+        let one = merge_adjacent(&model, plans.clone(), &[], 40, limit(300));
         let [one] = &one[..] else { panic!("{one:?}") };
         assert_eq!((&one.parts[..], &one.name[..]), (&[0, 1, 2, 3][..], "0"));
-        assert_eq!(one.divide, Division::Halves { most: 300 });
-        let [one] = &merge_adjacent(&model, plans, &[], 40, 1)[..] else { panic!() };
-        assert_eq!(one.divide, Division::Halves { most: 240 }, "no smaller than they were");
+        assert_eq!(one.divide, Division::Halves(limit(300)));
+        let [one] = &merge_adjacent(&model, plans, &[], 40, limit(1))[..] else { panic!() };
+        assert_eq!(one.divide, Division::Halves(limit(240)), "no smaller than they were");
     }
 }

@@ -5,11 +5,12 @@
 //! those of one surface ([`crate::builder::blocks::merge_adjacent`]); where there are no groups, or one is huge, the mesh is
 //! cut, exactly as nodes are (see [`crate::builder::cut::split`]).
 
-use crate::builder::blocks::block_plan::{BlockPlan, Division};
+use crate::builder::blocks::block_plan::{BlockPlan, BlockSize, Division};
 use crate::builder::blocks::merge_adjacent::merge_adjacent;
 use crate::builder::constants::BlockConstants;
+use crate::builder::simplify::aggregate::BodyRules;
 use crate::builder::stitch::Stitch;
-use crate::mesh::{Model, UpAxis};
+use crate::mesh::{Mesh, Model, Part, UpAxis};
 
 /// How blocks are made.
 #[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
@@ -55,7 +56,7 @@ impl std::fmt::Display for BlockMode {
 struct GroupFacts {
     group: usize,
     parts: Vec<usize>,
-    triangles: usize,
+    size: BlockSize,
     centre: [f64; 3],
 }
 
@@ -64,12 +65,12 @@ pub fn plan(
     model: &Model,
     mode: BlockMode,
     desired_tris: u32,
-    up: UpAxis,
     stitches: &[Stitch],
     constants: &BlockConstants,
+    rules: &BodyRules,
 ) -> Vec<BlockPlan> {
     let &BlockConstants { small_group, merged, large_group, divided, welded, .. } = constants;
-    let groups = group_facts(model);
+    let groups = group_facts(model, rules);
     let name = |group: usize| model.groups[group].name.clone();
     let whole = |facts: &GroupFacts| BlockPlan {
         name: name(facts.group),
@@ -80,7 +81,7 @@ pub fn plan(
     match mode {
         BlockMode::Groups => groups.iter().map(whole).collect(),
         BlockMode::Grid(metres) => {
-            let axes = match up {
+            let axes = match rules.up {
                 UpAxis::Y => [0, 2],
                 UpAxis::Z => [0, 1],
             };
@@ -92,20 +93,22 @@ pub fn plan(
         }
         BlockMode::Auto => {
             let large = if groups.len() == 1 { divided } else { large_group } * budget;
+            let bodies = rules.most_bodies(budget);
+            let of_budgets = |budgets: usize| BlockSize { triangles: budgets * budget, bodies };
             let mut plans: Vec<(usize, BlockPlan)> = Vec::new();
             let mut small = Vec::new();
             for facts in groups {
-                if facts.triangles < small_group * budget && model.groups.len() > 1 {
+                if facts.size.fits(of_budgets(small_group)) && model.groups.len() > 1 {
                     small.push(facts);
                 } else {
                     let mut block = whole(&facts);
-                    if facts.triangles > large {
-                        block.divide = Division::Halves { most: divided * budget };
+                    if !facts.size.fits(BlockSize { triangles: large, bodies }) {
+                        block.divide = Division::Halves(of_budgets(divided));
                     }
                     plans.push((facts.group, block));
                 }
             }
-            for cluster in merge_small(small, merged * budget) {
+            for cluster in merge_small(small, of_budgets(merged)) {
                 let first = cluster.iter().map(|facts| facts.group).min().unwrap_or(0);
                 let mut parts: Vec<usize> =
                     cluster.iter().flat_map(|facts| facts.parts.iter().copied()).collect();
@@ -115,12 +118,12 @@ pub fn plan(
             }
             plans.sort_by_key(|(first, _)| *first);
             let plans = plans.into_iter().map(|(_, plan)| plan).collect();
-            merge_adjacent(model, plans, stitches, budget / welded, merged * budget)
+            merge_adjacent(model, plans, stitches, budget / welded, of_budgets(merged))
         }
     }
 }
 
-fn group_facts(model: &Model) -> Vec<GroupFacts> {
+fn group_facts(model: &Model, rules: &BodyRules) -> Vec<GroupFacts> {
     let mut parts: Vec<Vec<usize>> = vec![Vec::new(); model.groups.len()];
     for (number, part) in model.parts.iter().enumerate() {
         parts[part.group as usize].push(number);
@@ -131,6 +134,7 @@ fn group_facts(model: &Model) -> Vec<GroupFacts> {
         .filter(|(_, parts)| !parts.is_empty())
         .map(|(group, parts)| {
             let triangles = parts.iter().map(|&part| model.parts[part].indices.len() / 3).sum();
+            let bodies = bodies_of(parts.iter().map(|&part| &model.parts[part]), rules);
             let mut low = [f64::INFINITY; 3];
             let mut high = [f64::NEG_INFINITY; 3];
             for position in parts.iter().flat_map(|&part| &model.parts[part].positions) {
@@ -140,22 +144,36 @@ fn group_facts(model: &Model) -> Vec<GroupFacts> {
                 }
             }
             let centre = std::array::from_fn(|i| (low[i] + high[i]) * 0.5);
-            GroupFacts { group, parts, triangles, centre }
+            GroupFacts { group, parts, size: BlockSize { triangles, bodies }, centre }
         })
         .collect()
 }
 
+/// The bodies of some parts together.
+fn bodies_of<'a>(parts: impl Iterator<Item = &'a Part>, rules: &BodyRules) -> usize {
+    let mut mesh = Mesh::<f64>::default();
+    for part in parts {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(&part.positions);
+        mesh.materials.resize(mesh.positions.len(), part.material);
+        let triangles = part.indices.as_chunks::<3>().0.iter();
+        mesh.triangles.extend(triangles.map(|corners| corners.map(|vertex| first + vertex)));
+    }
+    rules.crowd(&mesh)
+}
+
 /// Halves the groups along the longest side of their centres, at the middle by triangles, until
-/// no cluster has more than `most` triangles.
-fn merge_small(groups: Vec<GroupFacts>, most: usize) -> Vec<Vec<GroupFacts>> {
+/// no cluster is larger than `most`.
+fn merge_small(groups: Vec<GroupFacts>, most: BlockSize) -> Vec<Vec<GroupFacts>> {
     let mut clusters = Vec::new();
     let mut stack = vec![groups];
     while let Some(mut groups) = stack.pop() {
-        let total: usize = groups.iter().map(|facts| facts.triangles).sum();
+        let mut total = BlockSize::default();
+        groups.iter().for_each(|facts| total += facts.size);
         if groups.is_empty() {
             continue;
         }
-        if total <= most || groups.len() == 1 {
+        if total.fits(most) || groups.len() == 1 {
             clusters.push(groups);
             continue;
         }
@@ -170,8 +188,8 @@ fn merge_small(groups: Vec<GroupFacts>, most: usize) -> Vec<Vec<GroupFacts>> {
         let middle = groups
             .iter()
             .position(|facts| {
-                sum += facts.triangles;
-                2 * sum >= total
+                sum += facts.size.triangles;
+                2 * sum >= total.triangles
             })
             .map_or(1, |at| (at + 1).clamp(1, groups.len() - 1));
         let upper = groups.split_off(middle);

@@ -382,6 +382,7 @@ fn a_plane_of_fewer_triangles_is_at_no_distance() {
             weights: AppearanceWeights::default(),
             up: UpAxis::Z,
             reorientable: &[true],
+            extrudable: &[true],
             without: None,
             constants: &Constants::default(),
         };

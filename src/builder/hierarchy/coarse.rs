@@ -128,7 +128,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         mut border: Border,
         spans: Vec<BorderSpan>,
         node: &CoarseNode,
-        keep_folds: bool,
+        baked: bool,
     ) -> Coarse {
         let &CoarseNode { path, resolution, budget, .. } = node;
         let constants = &self.options.constants;
@@ -140,12 +140,13 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let spans = join_spans(spans, path, at, &mesh, &border);
         let skirt_triangles = triangles_of(&skirts(&mesh, &border, &spans, path, &rules));
         let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
-        let weights = AppearanceWeights { keep_folds, ..self.options.weights };
+        let weights = AppearanceWeights { keep_folds: baked, ..self.options.weights };
         let method = Method {
             simplifier: self.options.simplifier,
             weights,
             up: self.up,
             reorientable: self.reorientable,
+            extrudable: self.extrudable.materials(baked),
             without: self.options.without,
             constants,
         };

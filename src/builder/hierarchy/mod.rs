@@ -26,7 +26,7 @@ use crate::builder::border::span::original_spans;
 use crate::builder::border::vertex::Border;
 use crate::builder::cut::split::Chunk;
 use crate::builder::error::{Original, SurfaceError};
-use crate::builder::simplify::aggregate::has_many_bodies;
+use crate::builder::simplify::aggregate::{BodyRules, Extrudable, has_many_bodies};
 use crate::builder::simplify::compact::renumber;
 use crate::builder::simplify::merge::merge;
 use crate::builder::simplify::simplified::LadderStep;
@@ -54,6 +54,8 @@ pub struct BlockBuilder<'a, S> {
     pub up: UpAxis,
     /// Of each material, whether its faces may be reoriented ([`crate::builder::simplify::orient`]).
     pub reorientable: &'a [bool],
+    /// Of each material, whether prisms may have it.
+    pub extrudable: &'a Extrudable,
     /// Where nodes go.
     pub sink: &'a S,
     /// Where the time goes.
@@ -72,6 +74,13 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
     pub fn build(&self, block: Chunk) -> Result<Tree<S::Record>> {
         let plan = self.resolutions.root(block.mesh.triangles.len());
         Ok(self.subtree(block, plan, &[], false)?.tree)
+    }
+
+    /// What counts as a body in any node of the block.
+    fn bodies(&self) -> BodyRules<'_> {
+        let is_baked = self.bake.is_some_and(|plan| plan.always.is_some());
+        let extrudable = self.extrudable.materials(is_baked);
+        BodyRules { up: self.up, extrudable, constants: &self.options.constants.prisms }
     }
 
     /// How far rounding has moved a chunk off the source, metres at most, where that shows.
@@ -111,7 +120,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let all_leaves = children.iter().all(|(_, plan)| *plan == NodePlan::Leaf);
         let from_original = all_leaves
             || self.options.simplify_from == SimplifyFrom::Original
-            || has_many_bodies(&mesh, self.up, budget, &self.options.constants.prisms);
+            || has_many_bodies(&mesh, budget, &self.bodies());
         if from_original {
             let from_original = || {
                 let source = self.original(mesh, border, stitches, moved, &node);

@@ -71,8 +71,7 @@ fn stand_in(part: Mesh, border: Border, method: &Method) -> (Mesh, Border) {
         return (part, border);
     }
     let free = vec![false; part.positions.len()];
-    let prisms = &method.constants.prisms;
-    match extrude(&part, &free, method.up, TRIANGLES, prisms) {
+    match extrude(&part, &free, TRIANGLES, &method.bodies()) {
         Some(Extruded { prisms, rest, .. }) if rest.is_empty() => {
             let border = Border::interior(prisms.positions.len());
             (prisms, border)
@@ -105,7 +104,15 @@ mod tests {
 
     fn method(constants: &Constants) -> Method<'_> {
         let (simplifier, weights) = (Simplifier::Qem, AppearanceWeights::default());
-        Method { simplifier, weights, up: UpAxis::Z, reorientable: &[], without: None, constants }
+        Method {
+            simplifier,
+            weights,
+            up: UpAxis::Z,
+            reorientable: &[],
+            extrudable: &[true],
+            without: None,
+            constants,
+        }
     }
 
     /// Small triangles at places along X.

@@ -23,7 +23,7 @@ use std::cmp::Ordering;
 use crate::builder::border::vertex::{Border, BorderVertexState, Path};
 use crate::builder::constants::Constants;
 use crate::builder::error::MeanDistance;
-use crate::builder::simplify::aggregate::{Extruded, extrude, without_floors};
+use crate::builder::simplify::aggregate::{BodyRules, Extruded, extrude, without_floors};
 use crate::builder::simplify::cluster::cluster;
 pub use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::builder::simplify::collapse::collapse;
@@ -61,10 +61,20 @@ pub struct Method<'a> {
     pub up: UpAxis,
     /// Of each material, whether its faces may turn ([`crate::builder::simplify::orient`]).
     pub reorientable: &'a [bool],
+    /// See [`BodyRules`].
+    pub extrudable: &'a [bool],
     /// A step that is not tried, to measure what it is worth.
     pub without: Option<LadderStep>,
     /// See [`Constants`].
     pub constants: &'a Constants,
+}
+
+impl Method<'_> {
+    /// What counts as a body.
+    pub fn bodies(&self) -> BodyRules<'_> {
+        let &Self { up, extrudable, constants, .. } = self;
+        BodyRules { up, extrudable, constants: &constants.prisms }
+    }
 }
 
 /// Simplifies `mesh`, whose border is thinned already ([`crate::builder::border::thin`]), to at most about
@@ -117,7 +127,7 @@ fn nearest(
     let collapsed = |step| collapse(&source.mesh, &source.border, locked, target, step, weights);
     let mut prisms = None;
     if tries(LadderStep::Prisms)
-        && let Some(extruded) = extrude(&source.mesh, locked, up, target, &constants.prisms)
+        && let Some(extruded) = extrude(&source.mesh, locked, target, &method.bodies())
     {
         let is_sure = extruded.triangles_per_body < constants.prisms.sure;
         let completed = completed(source, extruded, locked, target, weights);
@@ -312,9 +322,17 @@ mod tests {
         let border = Border::interior(mesh.positions.len());
         let simplified = |target| {
             let weights = AppearanceWeights::default();
-            let (simplifier, up, reorientable) = (Simplifier::Qem, UpAxis::Z, &[true][..]);
+            let (simplifier, up, every) = (Simplifier::Qem, UpAxis::Z, &[true][..]);
             let constants = &Constants::default();
-            let method = Method { simplifier, weights, up, reorientable, without: None, constants };
+            let method = Method {
+                simplifier,
+                weights,
+                up,
+                reorientable: every,
+                extrudable: every,
+                without: None,
+                constants,
+            };
             simplify(&mesh, &border, &Path::default(), 0, target, &method)
         };
         let few = simplified(600);

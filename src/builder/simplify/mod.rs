@@ -15,3 +15,5 @@ mod parts;
 pub mod simplified;
 pub mod split_mixed;
 pub mod weld_seams;
+
+pub use self::aggregate::Extrudable;

@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::mesh::{DisjointSet, Mesh, PositionKey, key};
+use crate::mesh::{Coordinate, DisjointSet, Mesh, PositionKey, key};
 
 /// Triangles that hang together by their corners' positions.
 pub(super) struct Part {
@@ -12,8 +12,8 @@ pub(super) struct Part {
 }
 
 /// All parts, in order of their first triangles.
-pub(super) fn parts(mesh: &Mesh) -> Vec<Part> {
-    let mut first: FxHashMap<PositionKey<f32>, u32> = FxHashMap::default();
+pub(super) fn parts<C: Coordinate>(mesh: &Mesh<C>) -> Vec<Part> {
+    let mut first: FxHashMap<PositionKey<C>, u32> = FxHashMap::default();
     let mut connected = DisjointSet::new(mesh.positions.len());
     for (vertex, &position) in (0..).zip(&mesh.positions) {
         connected.join(*first.entry(key(position)).or_insert(vertex), vertex);

@@ -1,6 +1,6 @@
 //! What roofs and walls look like.
 
-use crate::mesh::Mesh;
+use crate::mesh::{Coordinate, Mesh};
 
 /// What a roof or a wall looks like.
 #[derive(Clone, Copy)]
@@ -20,7 +20,7 @@ pub(super) struct LookSum {
 }
 
 impl LookSum {
-    pub(super) fn add(&mut self, mesh: &Mesh, triangle: [u32; 3], area: f64) {
+    pub(super) fn add<C: Coordinate>(&mut self, mesh: &Mesh<C>, triangle: [u32; 3], area: f64) {
         if area > self.largest.0 {
             self.largest = (area, triangle[0]);
         }

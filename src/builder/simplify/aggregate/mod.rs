@@ -9,15 +9,74 @@
 //! Those that go on beyond a border, and what is no body (the ground, roads, fences) stay as they
 //! are.
 
+mod extrudable;
 mod floors;
 mod look;
 mod prisms;
+mod side_by_side;
 
+pub use self::extrudable::Extrudable;
 pub use self::floors::without_floors;
 use self::prisms::{Body, prisms};
+use self::side_by_side::rows;
 use crate::builder::constants::PrismConstants;
 use crate::builder::simplify::parts::{Part, parts};
-use crate::mesh::{Mesh, UpAxis};
+use crate::mesh::{Coordinate, Mesh, UpAxis};
+
+/// What counts as a body.
+#[derive(Clone, Copy, Debug)]
+pub struct BodyRules<'a> {
+    /// Which axis points at the sky.
+    pub up: UpAxis,
+    /// Of each material, whether prisms may have it: they have no texture coordinates, so a plain
+    /// one, or one whose texture is baked anew.
+    pub extrudable: &'a [bool],
+    /// See [`PrismConstants`].
+    pub constants: &'a PrismConstants,
+}
+
+impl BodyRules<'_> {
+    /// A part of a mesh as a body, if it is one.
+    fn body<'a, C: Coordinate>(&self, mesh: &Mesh<C>, part: &'a Part) -> Option<Body<'a>> {
+        let may = |&triangle: &[u32; 3]| {
+            let material = mesh.triangle_material(triangle) as usize;
+            self.extrudable.get(material).copied().unwrap_or_default()
+        };
+        let body = || Body::of(mesh, &part.triangles, self.up, self.constants);
+        part.triangles.iter().all(may).then(body).flatten()
+    }
+
+    /// How many bodies, as [`Self::crowd`] counts them, a block may have whose root has so many
+    /// triangles.
+    pub fn most_bodies(&self, target: usize) -> usize {
+        let each = self.constants.least_per_body;
+        if each > 0.0 { (target as f64 / each) as usize } else { usize::MAX }
+    }
+
+    /// How many separate bodies a mesh has, where each of several side by side counts about half:
+    /// they may become one block.
+    pub fn crowd<C: Coordinate>(&self, mesh: &Mesh<C>) -> usize {
+        if !self.any() {
+            return 0;
+        }
+        let parts = parts(mesh);
+        let bodies: Vec<Body> = parts.iter().filter_map(|part| self.body(mesh, part)).collect();
+        if bodies.is_empty() { 0 } else { (bodies.len() + rows(&bodies)).div_ceil(2) }
+    }
+
+    /// Whether prisms are wanted at all.
+    fn any(&self) -> bool {
+        self.constants.cells > 0 && self.extrudable.contains(&true)
+    }
+
+    /// How many separate bodies a mesh has; none where prisms are not wanted.
+    pub fn count<C: Coordinate>(&self, mesh: &Mesh<C>) -> usize {
+        if !self.any() {
+            return 0;
+        }
+        parts(mesh).iter().filter(|part| self.body(mesh, part).is_some()).count()
+    }
+}
 
 /// A mesh whose bodies are prisms.
 pub struct Extruded {
@@ -31,30 +90,19 @@ pub struct Extruded {
 
 /// Whether a mesh has so many separate bodies that prisms may be better than edge collapse for a
 /// node with so many triangles.
-pub fn has_many_bodies(mesh: &Mesh, up: UpAxis, target: usize, constants: &PrismConstants) -> bool {
-    let each = constants.triangles_per_body;
-    if constants.cells == 0 || !mesh.texcoords.is_empty() {
-        return false;
-    }
-    let parts = parts(mesh);
-    let is_body = |part: &&Part| Body::of(mesh, &part.triangles, up, constants).is_some();
-    parts.len() * each > target && parts.iter().filter(is_body).count() * each > target
+pub fn has_many_bodies(mesh: &Mesh, target: usize, rules: &BodyRules) -> bool {
+    rules.count(mesh) * rules.constants.triangles_per_body > target
 }
 
 /// Prisms are made of so many triangles at least: those of a box, without its floor.
 const LEAST_TRIANGLES: usize = 10;
 
-/// Replaces the bodies of an untextured `mesh` by prisms, so that about `target` triangles are left
+/// Replaces the bodies of a `mesh` by prisms, so that about `target` triangles are left
 /// for all if the rest is simplified too; `None` where there are too few bodies to be worth it, or
 /// these have too many borders for so few triangles. Nothing that has a `locked` vertex is replaced.
-pub fn extrude(
-    mesh: &Mesh,
-    locked: &[bool],
-    up: UpAxis,
-    target: usize,
-    constants: &PrismConstants,
-) -> Option<Extruded> {
-    if constants.cells == 0 || !mesh.texcoords.is_empty() {
+pub fn extrude(mesh: &Mesh, locked: &[bool], target: usize, rules: &BodyRules) -> Option<Extruded> {
+    let &BodyRules { up, constants, .. } = rules;
+    if !rules.any() {
         return None;
     }
     let (mut bodies, mut rest) = (Vec::new(), Vec::new());
@@ -63,7 +111,7 @@ pub fn extrude(
     for part in &parts {
         area += part.area;
         let is_free = || !part.triangles.iter().flatten().any(|&vertex| locked[vertex as usize]);
-        let body = is_free().then(|| Body::of(mesh, &part.triangles, up, constants)).flatten();
+        let body = is_free().then(|| rules.body(mesh, part)).flatten();
         match body {
             Some(body) => {
                 in_bodies += part.area;
@@ -114,6 +162,10 @@ mod tests {
         mesh
     }
 
+    fn rules(constants: &PrismConstants) -> BodyRules<'_> {
+        BodyRules { up: UpAxis::Z, extrudable: &[true], constants }
+    }
+
     #[test]
     fn a_town_becomes_prisms_of_its_footprint_and_volume() {
         let mesh = town();
@@ -122,7 +174,7 @@ mod tests {
         // With 6 triangles for each house rows are joined over gaps of 6 m, which are filled.
         for (target, most) in [(600, 1.5), (1200, 1.03)] {
             let Extruded { prisms, rest, .. } =
-                extrude(&mesh, &free, UpAxis::Z, target, &constants).unwrap();
+                extrude(&mesh, &free, target, &rules(&constants)).unwrap();
             assert_eq!(rest.len(), 1, "the ground");
             let count = prisms.triangles.len();
             assert!(count > target / 2 && count <= target + target / 10, "{count}");
@@ -149,12 +201,21 @@ mod tests {
             assert!((volume / covered - high).abs() < 0.1, "{volume} {covered}");
             assert!((0.97..most).contains(&(covered / 8000.0)), "{covered}");
         }
+        let mut textured = mesh.clone();
+        textured.texcoords = vec![[0.5; 2]; mesh.positions.len()];
+        let baked = extrude(&textured, &free, 600, &rules(&constants)).unwrap().prisms;
+        assert_eq!(baked.texcoords.len(), baked.positions.len());
+        let kept = BodyRules { extrudable: &[false], ..rules(&constants) };
+        assert!(extrude(&textured, &free, 600, &kept).is_none());
+        assert_eq!((rules(&constants).count(&textured), kept.count(&textured)), (100, 0));
+        // Houses of 8 by 10 m, 6 and 12 m apart.
+        assert_eq!((rules(&constants).crowd(&textured), kept.crowd(&textured)), (100, 0));
         let mut locked = free.clone();
         locked[0] = true;
-        let kept = extrude(&mesh, &locked, UpAxis::Z, 600, &constants).unwrap().rest;
+        let kept = extrude(&mesh, &locked, 600, &rules(&constants)).unwrap().rest;
         assert_eq!(kept.len(), 1 + 14);
-        assert!(extrude(&mesh, &free, UpAxis::Z, 2000, &constants).is_none(), "enough for all");
+        assert!(extrude(&mesh, &free, 2000, &rules(&constants)).is_none(), "enough for all");
         constants.cells = 0;
-        assert!(extrude(&mesh, &free, UpAxis::Z, 600, &constants).is_none());
+        assert!(extrude(&mesh, &free, 600, &rules(&constants)).is_none());
     }
 }

@@ -4,11 +4,14 @@ use glam::{DVec2, DVec3};
 
 use crate::builder::constants::PrismConstants;
 use crate::builder::simplify::aggregate::look::{Look, LookSum};
-use crate::mesh::{Mesh, UpAxis, wide};
+use crate::mesh::{Coordinate, Mesh, UpAxis, wide};
 
 /// A separate body with walls and roofs, whichever way its faces wind.
 pub(in super::super) struct Body<'a> {
     pub triangles: &'a [[u32; 3]],
+    /// The box around it, seen from above.
+    pub low: DVec2,
+    pub high: DVec2,
     /// What it covers of the ground, about, square metres.
     pub footprint: f64,
     pub roof: Look,
@@ -17,8 +20,8 @@ pub(in super::super) struct Body<'a> {
 
 impl<'a> Body<'a> {
     /// `None` for what is flat, or has hardly any walls.
-    pub fn of(
-        mesh: &Mesh,
+    pub fn of<C: Coordinate>(
+        mesh: &Mesh<C>,
         triangles: &'a [[u32; 3]],
         up: UpAxis,
         constants: &PrismConstants,
@@ -54,6 +57,7 @@ impl<'a> Body<'a> {
         let size: DVec2 = (high - low).truncate();
         let is_body = height > constants.least_height * footprint.sqrt()
             && walls >= constants.least_walls * 2.0 * size.element_sum() * height;
-        is_body.then_some(Self { triangles, footprint, roof, wall })
+        let (low, high) = (low.truncate(), high.truncate());
+        is_body.then_some(Self { triangles, low, high, footprint, roof, wall })
     }
 }

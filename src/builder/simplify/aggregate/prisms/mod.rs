@@ -175,6 +175,9 @@ impl Walls<'_> {
         let place: DVec3 = self.up.from_z_up(place);
         result.positions.push(place.as_vec3().to_array());
         result.materials.push(self.mesh.materials[look.vertex as usize]);
+        if !self.mesh.texcoords.is_empty() {
+            result.texcoords.push([0.0; 2]);
+        }
         if !self.mesh.colors.is_empty() {
             result.colors.push(look.color.map(|channel| channel.round() as u16));
         }
