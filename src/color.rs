@@ -6,6 +6,10 @@ use std::sync::LazyLock;
 static TO_LINEAR: LazyLock<[u16; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| unorm16(srgb_to_linear(byte as f64 / 255.0))));
 
+/// The same, 1 being 1.
+static TO_LIGHT: LazyLock<[f32; 256]> =
+    LazyLock::new(|| TO_LINEAR.map(|linear| f32::from(linear) / 65535.0));
+
 /// Linear values to one entry of the table back. Near black, neighbouring bytes are 20 apart in
 /// linear light, so that this loses no shade, and the table stays in the fastest cache.
 const PER_ENTRY: usize = 8;
@@ -48,6 +52,11 @@ pub(crate) fn unorm16(value: f64) -> u16 {
 /// The table from sRGB bytes to linear light, of which 65535 is 1.
 pub(crate) fn byte_to_linear() -> &'static [u16; 256] {
     &TO_LINEAR
+}
+
+/// The same table with linear light as numbers in 0–1.
+pub(crate) fn byte_to_light() -> &'static [f32; 256] {
+    &TO_LIGHT
 }
 
 /// From linear light to sRGB bytes, by table.

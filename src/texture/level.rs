@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use glam::{DVec2, Vec4};
+
 use super::bits::BitGrid;
 use super::fill::{self, Texels};
 use super::scale::{self, LinearImage, Rows, Weights};
@@ -36,6 +38,49 @@ pub(crate) struct LevelImage {
     pixels: Pixels,
 }
 
+/// An image's texels in linear light.
+#[derive(Clone, Copy)]
+pub(crate) struct Sampler<'a> {
+    /// From the first texel on.
+    bytes: &'a [u8],
+    channels: usize,
+    /// Bytes from one row to the next.
+    row: usize,
+    size: [usize; 2],
+    /// The middle of the last texel from that of the first.
+    last: DVec2,
+    light: &'static [f32; 256],
+}
+
+impl Sampler<'_> {
+    /// The colour at a position in texels by bilinear sampling, linear light, 0–1, and 1; beyond
+    /// the image its border texels go on.
+    #[inline]
+    pub fn at(&self, at: DVec2) -> Vec4 {
+        let low = (at - 0.5).clamp(DVec2::ZERO, self.last);
+        // As i32, to which and from which processors convert in one step.
+        let [x, y] = [low.x as i32, low.y as i32];
+        let [along, down] = [(low.x - f64::from(x)) as f32, (low.y - f64::from(y)) as f32];
+        let [x, y] = [x as usize, y as usize];
+        let next = if x + 1 < self.size[0] { self.channels } else { 0 };
+        let below = if y + 1 < self.size[1] { self.row } else { 0 };
+        let first = y * self.row + x * self.channels;
+        let mix = |start: usize| {
+            let (one, other) = (self.texel(start), self.texel(start + next));
+            one + (other - one) * along
+        };
+        let (upper, lower) = (mix(first), mix(first + below));
+        upper + (lower - upper) * down
+    }
+
+    #[inline]
+    fn texel(&self, start: usize) -> Vec4 {
+        let texel = &self.bytes[start..start + 3];
+        let [r, g, b] = [texel[0], texel[1], texel[2]].map(|byte| self.light[usize::from(byte)]);
+        Vec4::new(r, g, b, 1.0)
+    }
+}
+
 #[derive(Clone, Debug)]
 enum Pixels {
     /// The source's own, from this column and row on.
@@ -60,30 +105,20 @@ impl LevelImage {
         Self { size, channels, step, pixels: Pixels::Own(pixels) }
     }
 
-    /// The colour at a position in texels by bilinear sampling, linear light, 0–1; beyond the
-    /// image its border texels go on.
-    pub fn light_at(&self, at: [f64; 2]) -> [f32; 3] {
-        let table = color::byte_to_linear();
-        let (pixels, width, offset) = match &self.pixels {
+    /// The image, to be sampled many times.
+    pub fn sampler(&self) -> Sampler<'_> {
+        let (bytes, width, [x, y]) = match &self.pixels {
             Pixels::Source(image, offset) => (&image.pixels[..], image.width as usize, *offset),
             Pixels::Own(pixels) => (&pixels[..], self.size[0], [0; 2]),
         };
-        let [x, y] = [0, 1].map(|axis| {
-            let low = (at[axis] - 0.5).clamp(0.0, self.size[axis] as f64 - 1.0);
-            let first = low as usize;
-            (first, (first + 1).min(self.size[axis] - 1), (low - first as f64) as f32)
-        });
-        let mut light = [0.0; 3];
-        for (row, weight) in [(y.0, 1.0 - y.2), (y.1, y.2)] {
-            let start = (row + offset[1]) * width + offset[0];
-            for (column, weight) in [(x.0, weight * (1.0 - x.2)), (x.1, weight * x.2)] {
-                let texel = &pixels[(start + column) * self.channels..][..3];
-                for channel in 0..3 {
-                    light[channel] += f32::from(table[usize::from(texel[channel])]) * weight;
-                }
-            }
+        Sampler {
+            bytes: &bytes[(y * width + x) * self.channels..],
+            channels: self.channels,
+            row: width * self.channels,
+            size: self.size,
+            last: DVec2::from(self.size.map(|side| side as f64 - 1.0)),
+            light: color::byte_to_light(),
         }
-        light.map(|light| light * (1.0 / 65535.0))
     }
 
     /// The same at half the resolution.

@@ -2,17 +2,17 @@
 
 use std::ops::Range;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3, Vec4};
 
 use super::flat::{FlatChart, for_centres};
 use super::project::{Projection, Shown, TexelPlane};
-use super::source::{Source, SurfacePoint};
+use super::source::{Source, SourceTriangle, SurfacePoint};
 use crate::color;
 use crate::mesh::{Mesh, wide};
 use crate::texture::bits::BitGrid;
 use crate::texture::block::{BlockTextures, Prepared};
 use crate::texture::fill;
-use crate::texture::level::LevelImage;
+use crate::texture::level::{LevelImage, Sampler};
 use crate::texture::raster::Rasterizer;
 
 /// A chart's image.
@@ -131,6 +131,7 @@ impl BlockTextures<'_> {
         let mut projection = Projection::default();
         let byte = color::linear_to_byte();
         let mut near = None;
+        let mut sums: Vec<Vec4> = Vec::new();
         for (number, (&triangle, &flat)) in (0..).zip(chart.triangles.iter().zip(&corners)) {
             let triangle = mesh.triangles[triangle as usize];
             let sampled = flat.map(|corner| corner * samples as f64);
@@ -153,24 +154,33 @@ impl BlockTextures<'_> {
                         .map(|Range { start, end }| start * samples..end * samples);
                     projection.draw(source, plane, reach, sampled, &self.steps);
                 }
-                for (y, x) in rows.flat_map(|y| columns.clone().map(move |x| (y, x))) {
-                    if owners[y * width + x] != number {
-                        continue;
+                for y in rows {
+                    let owned = &owners[y * width..][..width];
+                    sums.clear();
+                    sums.resize(columns.len(), Vec4::ZERO);
+                    if plane.is_some() {
+                        let texels = (columns.clone(), y, samples);
+                        let is_own = |x: usize| owned[x] == number;
+                        self.add_samples(source, &projection, texels, is_own, &mut sums);
                     }
-                    let drawn = plane
-                        .as_ref()
-                        .and_then(|_| self.mean_color(source, &projection, [x, y], samples));
-                    let searched = || {
-                        let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5) * samples as f64;
-                        let point =
-                            plane.as_ref().map_or((a + b + c) / 3.0, |plane| plane.at(centre));
-                        near = source.nearest(point, normal, near, SLACK / scale).or(near);
-                        Some(self.color_at(source, near?, finer))
-                    };
-                    let Some(color) = drawn.or_else(searched) else { continue };
-                    pixels[(y * width + x) * 3..][..3]
-                        .copy_from_slice(&color.map(|light| byte.of((light * 65535.0) as u16)));
-                    known.set(x, y);
+                    for (x, sum) in columns.clone().zip(&sums) {
+                        if owned[x] != number {
+                            continue;
+                        }
+                        let drawn = (sum.w > 0.0).then(|| sum.truncate() / sum.w);
+                        let mut searched = || {
+                            let centre =
+                                DVec2::new(x as f64 + 0.5, y as f64 + 0.5) * samples as f64;
+                            let point =
+                                plane.as_ref().map_or((a + b + c) / 3.0, |plane| plane.at(centre));
+                            near = source.nearest(point, normal, near, SLACK / scale).or(near);
+                            Some(self.color_at(source, near?, finer))
+                        };
+                        let Some(color) = drawn.or_else(&mut searched) else { continue };
+                        let bytes = color.to_array().map(|light| byte.of((light * 65535.0) as u16));
+                        pixels[(y * width + x) * 3..][..3].copy_from_slice(&bytes);
+                        known.set(x, y);
+                    }
                 }
             }
         }
@@ -184,68 +194,97 @@ impl BlockTextures<'_> {
         (source_texels.round() as usize).clamp(1, SAMPLES[usize::from(level > 0)])
     }
 
-    /// The mean of what the samples of a texel show; `None` where they show nothing.
-    fn mean_color(
+    /// Adds what the samples of those texels of a row show that are asked for, linear light, 0–1,
+    /// and how many show anything.
+    fn add_samples(
         &self,
         source: &Source,
         projection: &Projection,
-        [x, y]: [usize; 2],
-        samples: usize,
-    ) -> Option<[f32; 3]> {
-        let (mut sum, mut count) = ([0.0f32; 3], 0u16);
+        (columns, y, samples): (Range<usize>, usize, usize),
+        is_own: impl Fn(usize) -> bool,
+        sums: &mut [Vec4],
+    ) {
+        // Most samples show what the one before them shows.
+        let mut before: Option<(u32, Shading)> = None;
         for row in y * samples..(y + 1) * samples {
-            for column in x * samples..(x + 1) * samples {
-                if let Some(shown) = projection.at(column, row) {
-                    let centre = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
-                    let color = self.color_of(source, shown, centre);
-                    sum = std::array::from_fn(|channel| sum[channel] + color[channel]);
-                    count += 1;
+            for (x, sum) in columns.clone().zip(&mut *sums).filter(|&(x, _)| is_own(x)) {
+                for column in x * samples..(x + 1) * samples {
+                    let Some((number, shown)) = projection.at(column, row) else { continue };
+                    let shading = match &before {
+                        Some((same, shading)) if *same == number => shading,
+                        _ => &before.insert((number, self.shading(source, shown))).1,
+                    };
+                    let [column, row] = [column as i32, row as i32].map(f64::from);
+                    *sum += shading.at(DVec2::new(column + 0.5, row + 0.5));
                 }
             }
         }
-        (count > 0).then(|| sum.map(|channel| channel / f32::from(count)))
     }
 
-    /// What a sample shows of the original, linear light, 0–1.
-    fn color_of(&self, source: &Source, shown: &Shown, centre: DVec2) -> [f32; 3] {
+    /// What gives samples of a triangle of the original their colours.
+    fn shading<'a>(&'a self, source: &Source, shown: &'a Shown) -> Shading<'a> {
         let triangle = source.triangle(shown.triangle);
-        let Some(Prepared::Atlas(atlas)) = self.textures.get(triangle.texture as usize) else {
-            return [1.0; 3];
-        };
-        let image = &atlas.levels[shown.level as usize];
-        let color = image.light_at((shown.texel(centre) / image.step).to_array());
-        tinted(color, triangle.colors, || shown.weights(centre))
+        let image = self.levels_of(triangle).map(|levels| &levels[shown.level as usize]);
+        let step = image.map_or(1.0, |image| image.step);
+        Shading {
+            sampler: image.map(LevelImage::sampler),
+            texels: shown.texels(1.0 / step),
+            shown,
+            colors: triangle.colors,
+        }
+    }
+
+    /// The images of a triangle of the original, by level; `None` where it has no texture.
+    fn levels_of(&self, triangle: &SourceTriangle) -> Option<&[LevelImage]> {
+        match self.textures.get(triangle.texture as usize) {
+            Some(Prepared::Atlas(atlas)) => Some(&atlas.levels),
+            _ => None,
+        }
     }
 
     /// What the original shows at a point, at the level's resolution, linear light, 0–1.
-    fn color_at(&self, source: &Source, point: SurfacePoint, level: usize) -> [f32; 3] {
+    fn color_at(&self, source: &Source, point: SurfacePoint, level: usize) -> Vec3 {
         let triangle = source.triangle(point.triangle);
-        let Some(Prepared::Atlas(atlas)) = self.textures.get(triangle.texture as usize) else {
-            return [1.0; 3];
-        };
-        let image = &atlas.levels[level];
+        let Some(levels) = self.levels_of(triangle) else { return Vec3::ONE };
+        let image = &levels[level];
         let along = |axis: usize| {
             (0..3).map(|i| point.weights[i] * f64::from(triangle.texels[i][axis])).sum::<f64>()
         };
-        let color = image.light_at([along(0) / image.step, along(1) / image.step]);
-        tinted(color, triangle.colors, || point.weights)
+        let light = image.sampler().at(DVec2::new(along(0), along(1)) / image.step);
+        (light * tint(triangle.colors, || point.weights)).truncate()
     }
 }
 
-/// A colour multiplied with the vertex colours of a triangle's corners, weighted.
-fn tinted(
-    mut color: [f32; 3],
+/// What gives samples of one triangle of the original their colours.
+struct Shading<'a> {
+    /// `None` where the triangle has no texture.
+    sampler: Option<Sampler<'a>>,
+    /// The position in its image of the origin of the chart, and by column and row.
+    texels: [DVec2; 3],
+    shown: &'a Shown,
     colors: Option<[[u16; 4]; 3]>,
-    weights: impl Fn() -> [f64; 3],
-) -> [f32; 3] {
-    if let Some(colors) = colors {
-        let weights = weights();
-        for (channel, light) in color.iter_mut().enumerate() {
-            let own = (0..3).map(|i| weights[i] * f64::from(colors[i][channel])).sum::<f64>();
-            *light *= (own / 65535.0) as f32;
-        }
+}
+
+impl Shading<'_> {
+    /// The colour of a sample, and 1.
+    #[inline]
+    fn at(&self, centre: DVec2) -> Vec4 {
+        let Some(sampler) = &self.sampler else { return Vec4::ONE };
+        let [origin, right, down] = self.texels;
+        let light = sampler.at(origin + right * centre.x + down * centre.y);
+        light * tint(self.colors, || self.shown.weights(centre))
     }
-    color
+}
+
+/// The vertex colours of a triangle's corners, weighted, and 1.
+fn tint(colors: Option<[[u16; 4]; 3]>, weights: impl Fn() -> [f64; 3]) -> Vec4 {
+    let Some(colors) = colors else { return Vec4::ONE };
+    let weights = weights();
+    let channel = |channel: usize| {
+        let own = (0..3).map(|i| weights[i] * f64::from(colors[i][channel])).sum::<f64>();
+        (own / 65535.0) as f32
+    };
+    Vec4::new(channel(0), channel(1), channel(2), 1.0)
 }
 
 /// How far the original is from a node's vertices.

@@ -101,9 +101,10 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    /// The position in the image that a texel of the chart shows.
-    pub fn texel(&self, at: DVec2) -> DVec2 {
-        self.at + self.along[0] * at.x + self.along[1] * at.y
+    /// The position in the image that the origin of the chart shows, and by how much it moves with
+    /// each column and row; times `scale`.
+    pub fn texels(&self, scale: f64) -> [DVec2; 3] {
+        [self.at, self.along[0], self.along[1]].map(|texels| texels * scale)
     }
 
     /// The weights of the triangle's corners at a texel of the chart.
@@ -126,10 +127,11 @@ pub(super) struct Projection {
     spans: Vec<[f64; 2]>,
 }
 
-/// The least whole number that is not below a value of 0 or more.
+/// The least whole number that is not below a value of 0 or more, of which i32 has enough and is
+/// converted to in one step.
 fn up(value: f64) -> usize {
-    let below = value as usize;
-    below + usize::from((below as f64) < value)
+    let below = value as i32;
+    below as usize + usize::from(f64::from(below) < value)
 }
 
 /// The part of a range of columns whose centres have no negative value of any of three: each
@@ -219,7 +221,7 @@ impl Projection {
         let centres = |axis: usize, [first, end]: [usize; 2]| {
             let from = up((low[axis] - 0.5).clamp(first as f64, end as f64));
             // One after the last that is not above.
-            let to = (high[axis] + 0.5).clamp(from as f64, end as f64) as usize;
+            let to = (high[axis] + 0.5).clamp(from as f64, end as f64) as i32 as usize;
             from..to
         };
         let (columns, rows) = (centres(0, self.columns), centres(1, self.rows));
@@ -264,8 +266,8 @@ impl Projection {
             if from > to {
                 continue;
             }
-            for x in up(from)..=to as usize {
-                let value = (starts[2] + distance[1] * (x as f64 + 0.5)).abs();
+            for x in up(from)..=to as i32 as usize {
+                let value = (starts[2] + distance[1] * (f64::from(x as i32) + 0.5)).abs();
                 let texel = &mut self.nearest[row + x - self.columns[0]];
                 if value <= most && (value as f32) < texel.0 {
                     if own == NOTHING {
@@ -286,14 +288,16 @@ impl Projection {
         }
     }
 
-    /// What a texel shows; `None` beyond these columns and rows too.
-    pub fn at(&self, x: usize, y: usize) -> Option<&Shown> {
+    /// What a texel shows, and its number; `None` beyond these columns and rows too.
+    #[inline]
+    pub fn at(&self, x: usize, y: usize) -> Option<(u32, &Shown)> {
         let is_in = |at: usize, [first, end]: [usize; 2]| (first..end).contains(&at);
         if !is_in(x, self.columns) || !is_in(y, self.rows) {
             return None;
         }
         let row = (y - self.rows[0]) * (self.columns[1] - self.columns[0]);
-        self.shown.get(self.nearest[row + x - self.columns[0]].1 as usize)
+        let number = self.nearest[row + x - self.columns[0]].1;
+        Some((number, self.shown.get(number as usize)?))
     }
 }
 
@@ -378,13 +382,15 @@ mod tests {
                 continue;
             };
             shown += 1;
-            let found = projection.at(x, y).unwrap();
+            let (_, found) = projection.at(x, y).unwrap();
             assert_eq!(found.triangle, number, "{x} {y}");
             for (found, expected) in found.weights(centre).into_iter().zip(weights) {
                 assert!((found - expected).abs() < 1e-6, "{found} {expected}");
             }
             let texel = DVec2::new(weights[1], weights[2]) * 100.0;
-            assert!(found.texel(centre).distance(texel) < 1e-3);
+            let [origin, right, down] = found.texels(1.0);
+            let shown = origin + right * centre.x + down * centre.y;
+            assert!(shown.distance(texel) < 1e-3);
         }
         assert!(shown > 300 && empty > 50, "{shown} shown, {empty} empty");
         assert!(beside > 200, "{beside} beside");
