@@ -1,11 +1,12 @@
 //! FLIP of the coarse levels of a built scene against its leaves, from twelve fixed views around it.
 //!
-//! usage: level_views OUT [--levels N] [--near PIXELS] [--far PIXELS] [--pictures FOLDER]
-//!        [--adapter NAME]
+//! usage: level_views OUT [--levels N] [--near PIXELS] [--far PIXELS] [--samples N]
+//!        [--pictures FOLDER] [--adapter NAME]
 //!
 //! Views are from every 45 degrees around at 30 degrees over the horizon and every 90 at 60. The
-//! scene's box is at most 800 pixels wide and high in the near views, 300 in the far ones. Prints a
-//! JSON object: by level its triangles and the mean FLIP of the near and of the far views, over the
+//! scene's box is at most 800 pixels wide and high in the near views, 300 in the far ones. A pixel is
+//! the mean of N by N samples (default 4), or leaves whose triangles are smaller than a pixel would
+//! differ from everything, themselves half a pixel further included. Prints a JSON object: by level its triangles and the mean FLIP of the near and of the far views, over the
 //! pixels that either picture has something in. Level N is the last (default 1).
 
 use std::error::Error;
@@ -13,10 +14,11 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 use hlod::camera::{Pose, from_angles};
+use hlod::color::{linear_to_srgb, srgb_to_linear};
 use hlod::format::Scene;
 use hlod::picture_error::{PIXELS_PER_DEGREE, flip};
 use hlod::render::{RenderOptions, Renderer};
-use image::{Rgb, RgbImage, RgbaImage};
+use image::{Rgb, RgbImage, Rgba, RgbaImage};
 
 #[path = "support/levels.rs"]
 mod levels;
@@ -30,6 +32,7 @@ struct Arguments {
     out: PathBuf,
     levels: u32,
     sizes: [u32; 2],
+    samples: u32,
     pictures: Option<PathBuf>,
     adapter: Option<String>,
 }
@@ -70,7 +73,7 @@ fn main() -> Result<()> {
 /// The pictures of a level from all views.
 fn views(scene: &Scene, arguments: &Arguments, size: u32, level: u32) -> Result<Vec<RgbaImage>> {
     let options = RenderOptions {
-        size: [size * 5 / 4, size * 5 / 4],
+        size: [size * 5 / 4 * arguments.samples; 2],
         adapter: arguments.adapter.clone(),
         ..RenderOptions::default()
     };
@@ -99,9 +102,25 @@ fn views(scene: &Scene, arguments: &Arguments, size: u32, level: u32) -> Result<
         for (pixel, covered) in picture.pixels_mut().zip(coverage.pixels()) {
             pixel.0[3] = covered.0[0];
         }
-        pictures.push(picture);
+        pictures.push(mean(&picture, arguments.samples));
     }
     Ok(pictures)
+}
+
+/// The picture with squares of so many pixels a side averaged, in linear light.
+fn mean(picture: &RgbaImage, side: u32) -> RgbaImage {
+    let to_linear: [f64; 256] = std::array::from_fn(|byte| srgb_to_linear(byte as f64 / 255.0));
+    let count = f64::from(side * side);
+    RgbaImage::from_fn(picture.width() / side, picture.height() / side, |x, y| {
+        let (mut light, mut covered) = ([0.0; 3], 0u32);
+        for (row, column) in (0..side).flat_map(|row| (0..side).map(move |column| (row, column))) {
+            let pixel = picture.get_pixel(x * side + column, y * side + row).0;
+            light = std::array::from_fn(|i| light[i] + to_linear[usize::from(pixel[i])]);
+            covered += u32::from(pixel[3] > 0);
+        }
+        let [r, g, b] = light.map(|sum| (linear_to_srgb(sum / count) * 255.0).round() as u8);
+        Rgba([r, g, b, if covered > 0 { 255 } else { 0 }])
+    })
 }
 
 /// FLIP over the pixels in which either picture has a surface.
@@ -119,7 +138,8 @@ fn difference(leaves: &RgbaImage, level: &RgbaImage) -> Result<f64> {
 }
 
 fn parse() -> Result<Arguments> {
-    let (mut levels, mut sizes, mut pictures, mut adapter) = (1, [800, 300], None, None);
+    let (mut levels, mut sizes, mut samples, mut pictures, mut adapter) =
+        (1, [800, 300], 4, None, None);
     let mut places = Vec::new();
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
@@ -128,6 +148,7 @@ fn parse() -> Result<Arguments> {
             "--levels" => levels = value()?.parse()?,
             "--near" => sizes[0] = value()?.parse()?,
             "--far" => sizes[1] = value()?.parse()?,
+            "--samples" => samples = value()?.parse()?,
             "--pictures" => pictures = Some(value()?.into()),
             "--adapter" => adapter = Some(value()?),
             _ if word.starts_with("--") => return Err(format!("no such option: {word}").into()),
@@ -135,5 +156,5 @@ fn parse() -> Result<Arguments> {
         }
     }
     let [out] = <[PathBuf; 1]>::try_from(places).map_err(|_| "usage: level_views OUT [options]")?;
-    Ok(Arguments { out, levels, sizes, pictures, adapter })
+    Ok(Arguments { out, levels, sizes, samples, pictures, adapter })
 }

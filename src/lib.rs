@@ -9,6 +9,7 @@ pub mod bench;
 pub mod builder;
 pub mod camera;
 pub mod city;
+pub mod color;
 pub mod cpu_time;
 pub mod decode;
 pub mod error;
@@ -26,7 +27,5 @@ pub mod runtime;
 pub mod texture;
 pub mod tileset;
 pub mod verify;
-
-mod color;
 
 pub use error::{Error, Result};

@@ -163,7 +163,7 @@ struct BuildArgs {
     )]
     origin: Option<OriginArg>,
 
-    /// Quality of the leaves' JPEG textures, 1-100; those of coarse levels are half as far from 100.
+    /// Quality of the leaves' JPEG textures, 1-100; those of coarse levels are a quarter as far from 100.
     /// From 90 on, colour keeps its full resolution
     #[arg(long, value_name = "Q", default_value_t = 85, help_heading = "Textures")]
     jpeg_quality: u8,

@@ -19,7 +19,7 @@ pub struct BuildOptions {
     pub up: Option<UpAxis>,
     /// Where the city stands on the Earth.
     pub placement: Placement,
-    /// JPEG quality of leaves, 1–100; coarse levels are half as far from 100.
+    /// JPEG quality of leaves, 1–100; coarse levels are a quarter as far from 100.
     pub jpeg_quality: u8,
     /// Longest side of an atlas in texels, 16–65535.
     pub max_atlas: u32,

@@ -20,7 +20,7 @@ use crate::mesh::{Mesh, Model};
 /// What of the texture work can be chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TextureOptions {
-    /// JPEG quality of leaves, 1–100; coarse levels are half as far from 100. From 90 on, colour is
+    /// JPEG quality of leaves, 1–100; coarse levels are a quarter as far from 100. From 90 on, colour is
     /// kept at full resolution. Default 85.
     pub jpeg_quality: u8,
     /// Longest side of an atlas, texels, 16–65535; default 4096. A leaf that needs more gets

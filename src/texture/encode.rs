@@ -20,11 +20,11 @@ pub(crate) fn extension(channels: usize) -> &'static str {
     if channels == 4 { "png" } else { "jpg" }
 }
 
-/// The quality of a coarse level's images where leaves have this one: half as far from the best. They
-/// are few bytes, each of their texels stands for many, and their charts are small, so that the
-/// colours of 4:2:0 run from one into the next.
+/// The quality of a coarse level's images where leaves have this one: a quarter as far from the best.
+/// Each of their texels stands for many, and their charts are small, so that the colours of 4:2:0 run
+/// from one into the next.
 pub(crate) fn coarse_quality(quality: u8) -> u8 {
-    100 - (100 - quality.clamp(1, 100)) / 2
+    100 - (100 - quality.clamp(1, 100)) / 4
 }
 
 /// Encodes RGB as JPEG (4:2:0 below quality 90, else 4:4:4) and RGBA as PNG.
