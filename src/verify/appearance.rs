@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::distance::FrontDistances;
+use super::distance::{FrontDistances, ShownAt};
 use super::geometry::NodeGeometry;
 use super::node_textures::{NodePoint, NodeTextures};
 use super::options::Limits;
@@ -103,8 +103,8 @@ pub(super) fn texels(
 
 const HINT: &str = "build again with --force; a higher --jpeg-quality lowers JPEG's own part";
 
-/// RMS colour difference of a level and its tiles. Points in leaves above the level count with
-/// the leaves' own difference.
+/// The colour difference of a level and its tiles. Points in leaves above the level count with the
+/// leaves' own difference.
 pub(super) fn level(
     scene: &Scene,
     distances: &FrontDistances,
@@ -114,23 +114,23 @@ pub(super) fn level(
     leaf_shown: &[Option<Color>],
     reference: &Reference,
     done: impl Fn() + Sync,
-) -> (Option<f64>, Option<TileFigures>) {
+) -> LevelAppearance {
     // By node, so that each file is read once; points stay in order within.
-    let mut closest = distances.closest.clone();
-    closest.sort_by_key(|&(number, node, ..)| (node, number));
     let mut below = vec![false; points.all.len()];
-    closest.iter().for_each(|&(number, ..)| below[number as usize] = true);
-    let groups: Vec<_> = closest.chunk_by(|a, b| a.1 == b.1).collect();
+    distances.shown.iter().for_each(|&(number, _)| below[number as usize] = true);
+    let shown = distances.shown.iter().filter_map(|&(number, shown)| Some((number, shown?)));
+    let mut shown: Vec<(u32, ShownAt)> = shown.collect();
+    shown.sort_by_key(|&(number, shown)| (shown.node, number));
+    let groups: Vec<_> = shown.chunk_by(|a, b| a.1.node == b.1.node).collect();
     let sums: Vec<(f64, u64, TileFigures)> = groups
         .par_iter()
         .map(|group| {
-            let node = group[0].1;
-            let at: Vec<NodePoint> =
-                group.iter().map(|&(_, _, triangle, weights)| (triangle, weights)).collect();
+            let node = group[0].1.node;
+            let at: Vec<NodePoint> = group.iter().map(|(_, shown)| shown.at).collect();
             let colors = images.colors(node, &at);
             let scale = texel_scale(scene, geometry, node);
             let mut found = (0.0, 0, TileFigures::default());
-            for (&(number, ..), color) in group.iter().zip(colors) {
+            for (&(number, _), color) in group.iter().zip(colors) {
                 add(&mut found, number as usize, color, scale, reference);
             }
             done();
@@ -146,8 +146,22 @@ pub(super) fn level(
     for (number, _) in below.iter().enumerate().filter(|(_, below)| !**below) {
         add(&mut all, number, leaf_shown[number], 1.0, reference);
     }
-    let rms = (all.1 > 0).then(|| (all.0 / all.1 as f64).sqrt());
-    (rms, (!reference.tile.is_empty()).then_some(all.2))
+    let colored = reference.color.iter().filter(|color| color.is_some()).count();
+    LevelAppearance {
+        color_rms: (all.1 > 0).then(|| (all.0 / all.1 as f64).sqrt()),
+        color_share: (colored > 0).then(|| all.1 as f64 / colored as f64),
+        tiles: (!reference.tile.is_empty()).then_some(all.2),
+    }
+}
+
+/// How a level looks beside the source.
+pub(super) struct LevelAppearance {
+    /// RMS colour difference.
+    pub color_rms: Option<f64>,
+    /// The share of the source's coloured points that it is of: those for which something stands.
+    pub color_share: Option<f64>,
+    /// Tiles of generated cities.
+    pub tiles: Option<TileFigures>,
 }
 
 /// Check: the leaves show the tiles that the source shows there.

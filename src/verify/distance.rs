@@ -6,16 +6,18 @@
 //! the source it is to the whole front, and counts for the node above the leaf that the point lies
 //! on: that node stands for it. Leaves in the front are the source itself and count as no distance.
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::assembly::Assembly;
 use super::distance_stats::DistanceStats;
 use super::front::Front;
 use super::geometry::NodeGeometry;
+use super::node_textures::NodePoint;
 use super::points::Points;
 use super::progress::Progress;
 use super::report::Distance;
-use super::sample::spread;
+use super::sample::{cross, spread};
 use super::tree::is_leaf;
 use crate::format::Scene;
 use crate::mesh::Surface;
@@ -31,6 +33,25 @@ pub(super) struct NodeDistances {
     pub to_source: DistanceStats,
 }
 
+/// The point of a front that stands for one of the leaves: the nearest, where those that face
+/// another way count as farther.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ShownAt {
+    /// The node that has it.
+    pub node: u32,
+    /// Its triangle and weights there.
+    pub at: NodePoint,
+}
+
+/// A surface stands for another if the cosine of the angle between their normals is at least this: a
+/// flat roof for a gable, but no wall for a floor.
+const FACING: f64 = 0.5;
+
+/// How many times as far a surface counts that faces another way, and by how many times more, for
+/// each unit that the cosine is below 1, one that faces much the same way.
+const AWAY: f64 = 8.0;
+const ASIDE: f64 = 4.0;
+
 /// What was measured of a front.
 pub(super) struct FrontDistances {
     /// Its nodes that are no leaves, in order.
@@ -39,9 +60,8 @@ pub(super) struct FrontDistances {
     pub to_front: DistanceStats,
     /// From the front to the source.
     pub to_source: DistanceStats,
-    /// For each point that lies below a coarse node, its number, and the node, triangle and
-    /// weights of the front's closest point.
-    pub closest: Vec<(u32, u32, u32, [f64; 3])>,
+    /// For each point that lies below a coarse node, its number, and what the front shows there.
+    pub shown: Vec<(u32, Option<ShownAt>)>,
 }
 
 /// Measures a front. `reference` is the source, or the leaves joined.
@@ -71,25 +91,26 @@ pub(super) fn measure(
         .filter_map(|(index, &leaf)| {
             let above = front.above(scene, leaf).filter(|&node| node != leaf)?;
             let mut stats = DistanceStats::default();
-            let mut closest = Vec::new();
+            let mut shown = Vec::new();
             for number in points.of_leaf(index) {
-                let point = points.all[number].point;
-                let Some(hit) = assembly.surface.closest(point) else { continue };
+                let point = &points.all[number];
+                let Some(hit) = assembly.surface.closest(point.point) else { continue };
                 stats.add(hit.distance());
-                let (node, triangle) = assembly.owner(hit.triangle);
-                closest.push((number as u32, node, triangle, hit.weights));
+                let triangle = geometry[leaf as usize].triangles[point.triangle as usize];
+                let normal = normal(geometry[leaf as usize].corners(triangle));
+                shown.push((number as u32, assembly.shown(point.point, normal, hit.triangle)));
             }
             for vertex in geometry[leaf as usize].surface_vertices() {
                 stats.reach(assembly.surface.distance(vertex));
             }
             progress.done(1);
-            Some((above, stats, closest))
+            Some((above, stats, shown))
         })
         .collect();
-    let mut closest = Vec::new();
+    let mut shown = Vec::new();
     for (above, stats, hits) in from_leaves {
         nodes[place_of[above as usize]].to_front.extend(&stats);
-        closest.extend(hits);
+        shown.extend(hits);
     }
 
     let from_nodes: Vec<DistanceStats> = nodes
@@ -123,7 +144,27 @@ pub(super) fn measure(
             to_source.add_zeros(count);
         }
     }
-    FrontDistances { nodes, to_front, to_source, closest }
+    FrontDistances { nodes, to_front, to_source, shown }
+}
+
+impl Assembly {
+    /// What stands for a point of a surface that faces this way; `None` where all that is near
+    /// faces another way, as at the floor of a house whose floor is gone. The search begins with
+    /// triangle `first`.
+    fn shown(&self, point: DVec3, facing: DVec3, first: u32) -> Option<ShownAt> {
+        let cosine = |triangle: u32| normal(self.surface.corners(triangle)).dot(facing);
+        let weight = |triangle: u32| match cosine(triangle) {
+            cosine if cosine < FACING => AWAY,
+            cosine => 1.0 + ASIDE * (1.0 - cosine),
+        };
+        let hit = self.surface.closest_of(point, Some(first), weight)?;
+        let (node, triangle) = self.owner(hit.triangle);
+        (cosine(hit.triangle) >= FACING).then_some(ShownAt { node, at: (triangle, hit.weights) })
+    }
+}
+
+fn normal(corners: [DVec3; 3]) -> DVec3 {
+    cross(corners).normalize_or_zero()
 }
 
 /// A stats in metres and in units of 1e-4 of a diagonal.
@@ -155,9 +196,6 @@ pub(super) fn larger(a: &Distance, b: &Distance) -> Distance {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
-    use super::super::sample::cross;
     use super::*;
     use crate::format::test_scene::scene;
     use crate::random::Random;
@@ -204,6 +242,30 @@ mod tests {
 
     fn all(nodes: &[&NodeGeometry]) -> Vec<[DVec3; 3]> {
         nodes.iter().flat_map(|node| node.surface().map(|(_, corners)| corners)).collect()
+    }
+
+    #[test]
+    fn a_flat_roof_stands_for_a_gable_and_no_wall_for_a_floor() {
+        // A wall along x from 0 to 8, 5 m high, that faces -y, and the roof behind it.
+        let block = NodeGeometry {
+            positions: vec![
+                [0.0, 0.0, 0.0],
+                [8.0, 0.0, 0.0],
+                [8.0, 0.0, 5.0],
+                [0.0, 0.0, 5.0],
+                [8.0, 9.0, 5.0],
+                [0.0, 9.0, 5.0],
+            ],
+            triangles: vec![[0, 1, 2], [0, 2, 3], [3, 2, 4], [3, 4, 5]],
+            ..NodeGeometry::default()
+        };
+        let assembly = Assembly::new([0].into_iter(), &[block]);
+        let triangle =
+            |point: DVec3, facing: DVec3| assembly.shown(point, facing, 0).map(|shown| shown.at.0);
+        let gable = DVec3::new(0.0, -1.0, 1.6).normalize();
+        assert!(triangle(DVec3::new(2.0, 0.7, 4.1), gable) >= Some(2), "though the wall is nearer");
+        assert!(triangle(DVec3::new(2.0, 0.1, 1.0), DVec3::NEG_Y) < Some(2));
+        assert_eq!(triangle(DVec3::new(2.0, 0.1, 0.0), DVec3::NEG_Z), None);
     }
 
     #[test]

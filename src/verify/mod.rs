@@ -61,7 +61,7 @@ pub use report::{
 };
 pub use text::text;
 
-use appearance::Reference;
+use appearance::{LevelAppearance, Reference};
 use assembly::Assembly;
 use distance::{FrontDistances, NodeDistances};
 use front::Front;
@@ -275,7 +275,7 @@ impl Verification<'_> {
             let seed = options.seed;
             let distances =
                 distance::measure(scene, front, leaves, geometry, points, surface, seed, progress);
-            let (color_rms, tiles) = appearance::level(
+            let LevelAppearance { color_rms, color_share, tiles } = appearance::level(
                 scene,
                 &distances,
                 points,
@@ -286,7 +286,8 @@ impl Verification<'_> {
                 || {},
             );
             let figures = self.level_figures(front, level, geometry, &distances, diagonal);
-            (LevelFigures { kept: kept(front), color_rms, tiles, ..figures }, distances.nodes)
+            let kept = kept(front);
+            (LevelFigures { kept, color_rms, color_share, tiles, ..figures }, distances.nodes)
         };
         for level in 0..tree::coarse_levels(scene) {
             progress.phase(&format!("level {level}"), leaves.len() as u64);

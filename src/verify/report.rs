@@ -177,8 +177,13 @@ pub struct LevelFigures {
     pub two_sided: Distance,
     /// What it keeps of the outline of the leaves.
     pub kept: Kept,
-    /// RMS colour difference, sRGB 0–255; `None` where nothing could be compared.
+    /// RMS colour difference, sRGB 0–255, between points of the source and what stands for them: the
+    /// nearest surface within 60 degrees of facing the same way. `None` where nothing could be
+    /// compared.
     pub color_rms: Option<f64>,
+    /// The share of the source's points with a colour for which something stands, 0–1; floors of
+    /// houses whose floors are gone have nothing.
+    pub color_share: Option<f64>,
     /// Tiles of generated cities; `None` elsewhere.
     pub tiles: Option<TileFigures>,
 }
