@@ -33,7 +33,7 @@ pub struct BlockSize {
     /// Triangles.
     pub triangles: usize,
     /// Separate bodies that may become prisms, as
-    /// [`BodyRules::crowd`](crate::builder::simplify::aggregate::BodyRules::crowd) counts them.
+    /// [`BodyRules::crowd`](crate::builder::simplify::BodyRules::crowd) counts them.
     pub bodies: usize,
 }
 

@@ -16,4 +16,4 @@ pub mod simplified;
 pub mod split_mixed;
 pub mod weld_seams;
 
-pub use self::aggregate::Extrudable;
+pub use self::aggregate::{BodyRules, Extrudable};
