@@ -8,10 +8,13 @@
 //! simplification finds vertices inside of a surface where there were two borders.
 //!
 //! - [`open_edges`]: the borders
-//! - [`touching`]: what touches, and the strips
+//! - [`touching`]: what touches
+//! - `strip`: the triangles from one border to the other
 
 pub mod open_edges;
+mod strip;
 pub mod touching;
 
 pub use open_edges::OpenEdge;
-pub use touching::{Stitch, stitches};
+pub use strip::Stitch;
+pub use touching::stitches;

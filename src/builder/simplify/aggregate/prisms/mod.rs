@@ -12,6 +12,8 @@ mod gaps;
 mod heights;
 mod outlines;
 mod regions;
+mod segments;
+mod squares;
 mod tidy;
 
 use glam::{DVec2, DVec3};
