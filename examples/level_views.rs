@@ -5,9 +5,10 @@
 //!
 //! Views are from every 45 degrees around at 30 degrees over the horizon and every 90 at 60. The
 //! scene's box is at most 800 pixels wide and high in the near views, 300 in the far ones. A pixel is
-//! the mean of N by N samples (default 4), or leaves whose triangles are smaller than a pixel would
-//! differ from everything, themselves half a pixel further included. Prints a JSON object: by level its triangles and the mean FLIP of the near and of the far views, over the
-//! pixels that either picture has something in. Level N is the last (default 1).
+//! the mean of N by N samples (default 4): with one, leaves whose triangles are smaller than a pixel
+//! are noise, which differs from any level. Prints a JSON object: by level its triangles and the mean
+//! FLIP of the near and of the far views, over the pixels that either picture has something in. Level
+//! N is the last (default 1).
 
 use std::error::Error;
 use std::path::PathBuf;

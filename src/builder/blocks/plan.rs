@@ -3,7 +3,8 @@
 //! A block should have a few tens of thousands of triangles and be compact. Groups of the source
 //! are blocks where they are of that size; tiny ones are merged with their neighbours, and so are
 //! those of one surface ([`crate::builder::blocks::merge_adjacent`]); where there are no groups, or one is huge, the mesh is
-//! cut, exactly as nodes are (see [`crate::builder::cut::split`]).
+//! cut, exactly as nodes are (see [`crate::builder::cut::split`]). So is what has more buildings than
+//! its root has triangles for ([`crate::builder::simplify::BodyRules::crowd`]).
 
 use crate::builder::blocks::block_plan::{BlockPlan, BlockSize, Division};
 use crate::builder::blocks::merge_adjacent::merge_adjacent;
@@ -16,7 +17,8 @@ use crate::mesh::{Mesh, Model, Part, UpAxis};
 #[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BlockMode {
-    /// Groups where they make sense, merged where tiny or one surface, divided where huge or absent.
+    /// Groups where they make sense, merged where tiny or one surface, divided where huge, absent or
+    /// of more buildings than a root can stand for.
     #[default]
     Auto,
     /// Every group of the source is a block.
