@@ -8,12 +8,13 @@
 //! the mean of N by N samples (default 4): with one, leaves whose triangles are smaller than a pixel
 //! are noise, which differs from any level. Prints a JSON object: by level its triangles and the mean
 //! FLIP of the near and of the far views, over the pixels that either picture has something in. Level
-//! N is the last (default 1).
+//! N is the last (default 1). Into FOLDER go, by level and of the leaves, the first of the far views
+//! and one from a quarter of its distance.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use hlod::camera::{Pose, from_angles};
 use hlod::color::{linear_to_srgb, srgb_to_linear};
 use hlod::format::Scene;
@@ -56,23 +57,95 @@ fn main() -> Result<()> {
             let errors = leaves[kind].iter().zip(&pictures).map(|(a, b)| difference(a, b));
             let errors: Vec<f64> = errors.collect::<Result<_>>()?;
             means[kind] = errors.iter().sum::<f64>() / errors.len() as f64;
-            if let Some(folder) = &arguments.pictures {
-                std::fs::create_dir_all(folder)?;
-                let name = format!("level{level}-{size}.png");
-                pictures[0].save(folder.join(name))?;
-                leaves[kind][0].save(folder.join(format!("leaves-{size}.png")))?;
-            }
+        }
+        if let Some(folder) = &arguments.pictures {
+            save_pictures(&scene, &arguments, level, &folder.join(format!("level{level}")))?;
         }
         found.push(serde_json::json!({
             "level": level, "triangles": triangles, "near": means[0], "far": means[1],
         }));
     }
+    if let Some(folder) = &arguments.pictures {
+        save_pictures(&scene, &arguments, u32::MAX, &folder.join("leaves"))?;
+    }
     println!("{}", serde_json::json!({ "levels": found }));
     Ok(())
 }
 
+/// The first far view of a level, and one from a quarter of its distance: of the middle of what
+/// there is, which need not be the middle of the scene's box.
+fn save_pictures(scene: &Scene, arguments: &Arguments, level: u32, folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(folder)?;
+    let camera = Camera::new(scene, 0.0, -30.0)?;
+    let near = Camera { at: middle_of_leaves(scene)?, away: camera.away / 4.0, ..camera };
+    let pictures = pictures(scene, arguments, arguments.sizes[1], level, &[camera, near])?;
+    for (picture, name) in pictures.iter().zip(["far.png", "quarter.png"]) {
+        picture.save(folder.join(name))?;
+    }
+    Ok(())
+}
+
+/// The middle of the leaf that is nearest to the median, along each axis, of all leaves' middles.
+fn middle_of_leaves(scene: &Scene) -> Result<DVec3> {
+    let leaves = scene.nodes.iter().filter(|node| node.first_child.is_none());
+    let middles: Vec<DVec3> = leaves
+        .map(|leaf| (DVec3::from(leaf.bbox_min) + DVec3::from(leaf.bbox_max)) / 2.0)
+        .collect();
+    let median = DVec3::from_array(std::array::from_fn(|axis| {
+        let mut along: Vec<f64> = middles.iter().map(|middle| middle[axis]).collect();
+        along.sort_by(f64::total_cmp);
+        along.get(along.len() / 2).copied().unwrap_or_default()
+    }));
+    let off = |middle: &DVec3| middle.distance_squared(median);
+    let nearest = middles.into_iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+    nearest.ok_or_else(|| "the scene has no nodes".into())
+}
+
 /// The pictures of a level from all views.
 fn views(scene: &Scene, arguments: &Arguments, size: u32, level: u32) -> Result<Vec<RgbaImage>> {
+    let around = (0..8).map(|step| (f64::from(step) * 45.0, -30.0));
+    let above = (0..4).map(|step| (f64::from(step) * 90.0 + 20.0, -60.0));
+    let cameras = around.chain(above).map(|(yaw, pitch)| Camera::new(scene, yaw, pitch));
+    let cameras: Vec<_> = cameras.collect::<Result<_>>()?;
+    pictures(scene, arguments, size, level, &cameras)
+}
+
+struct Camera {
+    rotation: DQuat,
+    /// What is in the middle of the picture, and how far away.
+    at: DVec3,
+    away: f64,
+}
+
+impl Camera {
+    /// As near as four fifths of the picture's width and height hold all corners of the scene.
+    fn new(scene: &Scene, yaw_deg: f64, pitch_deg: f64) -> Result<Self> {
+        let bounds = scene.bounds().ok_or("the scene has no nodes")?.map(DVec3::from);
+        let middle = (bounds[0] + bounds[1]) / 2.0;
+        let rotation = from_angles(scene.up, yaw_deg, pitch_deg, 0.0);
+        let half = (FOV_Y_DEG.to_radians() / 2.0).tan() / 1.25;
+        let corners = (0..8).map(|corner| {
+            let side = |axis: usize| bounds[corner >> axis & 1][axis];
+            let seen = rotation.inverse() * (DVec3::new(side(0), side(1), side(2)) - middle);
+            seen.z + seen.x.abs().max(seen.y.abs()) / half
+        });
+        Ok(Self { rotation, at: middle, away: corners.fold(0.0, f64::max) })
+    }
+
+    fn pose(&self) -> Pose {
+        let position = self.at - self.rotation * DVec3::NEG_Z * self.away;
+        Pose { position, rotation: self.rotation, fov_y_deg: FOV_Y_DEG }
+    }
+}
+
+/// The pictures of a level, in which a scene that fills four fifths is `size` pixels wide or high.
+fn pictures(
+    scene: &Scene,
+    arguments: &Arguments,
+    size: u32,
+    level: u32,
+    cameras: &[Camera],
+) -> Result<Vec<RgbaImage>> {
     let options = RenderOptions {
         size: [size * 5 / 4 * arguments.samples; 2],
         adapter: arguments.adapter.clone(),
@@ -81,24 +154,9 @@ fn views(scene: &Scene, arguments: &Arguments, size: u32, level: u32) -> Result<
     let mut renderer = Renderer::new(&options)?;
     let nodes = front(scene, level);
     upload(scene, &arguments.out, &nodes, &mut renderer)?;
-    let bounds = scene.bounds().ok_or("the scene has no nodes")?.map(DVec3::from);
-    let middle = (bounds[0] + bounds[1]) / 2.0;
-    // Four fifths of the picture hold all corners of the scene.
-    let half = (FOV_Y_DEG.to_radians() / 2.0).tan() / 1.25;
-    let around = (0..8).map(|step| (f64::from(step) * 45.0, -30.0));
-    let above = (0..4).map(|step| (f64::from(step) * 90.0 + 20.0, -60.0));
     let mut pictures = Vec::new();
-    for (yaw, pitch) in around.chain(above) {
-        let rotation = from_angles(scene.up, yaw, pitch, 0.0);
-        let corners = (0..8).map(|corner| {
-            let side = |axis: usize| bounds[corner >> axis & 1][axis];
-            let seen = rotation.inverse() * (DVec3::new(side(0), side(1), side(2)) - middle);
-            seen.z + seen.x.abs().max(seen.y.abs()) / half
-        });
-        let away = corners.fold(0.0, f64::max);
-        let position = middle - rotation * DVec3::NEG_Z * away;
-        let pose = Pose { position, rotation, fov_y_deg: FOV_Y_DEG };
-        renderer.draw(&nodes, &pose, (away * 1e-3) as f32)?;
+    for camera in cameras {
+        renderer.draw(&nodes, &camera.pose(), (camera.away * 1e-3) as f32)?;
         let (mut picture, coverage) = (renderer.snapshot()?, renderer.coverage()?);
         for (pixel, covered) in picture.pixels_mut().zip(coverage.pixels()) {
             pixel.0[3] = covered.0[0];

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import statistics
 import subprocess
 
@@ -25,6 +26,12 @@ TRIANGLES_PER_BLOCK = 80_000
 TEXELS = 17
 # Of the thesis's data.
 THESIS_TEXELS = 105
+# As scans have them: hundreds of torn charts a block.
+TORN_TRIANGLES_PER_BLOCK = 16_000
+TORN_TEXELS = 1000
+TORN = "city of torn charts"
+# What textures add is measured on these.
+JPEG = ["city, 1 M, 105 texels", TORN, "sceaux", "oblique_b"]
 STAGES = ["compare", "import", "gather", "pictures", "cut", "simplify", "measure", "atlas", "write"]
 
 
@@ -34,7 +41,7 @@ def main():
     threads = sorted({1, os.cpu_count()})
     runs = measure_all(programs, arguments, threads)
     cities = [run for run in runs if run["texels"]]
-    findings = [scaling(runs, threads), jpeg_table(programs, arguments, runs, threads)]
+    findings = [scaling(runs, threads), jpeg_table(programs, arguments, runs)]
     about = [machine(), conditions(arguments)]
     full = paragraphs(about + [main_table(runs), stage_table(runs)] + findings)
     print(full)
@@ -70,6 +77,16 @@ def measure_all(programs, arguments, threads):
             texels_per_triangle=texels,
         )
         inputs.append((f"city, {size / 1e6:g} M, {texels} texels", size, texels, [city]))
+    blocks, charts = (1, 100) if arguments.quick else (6, 300)
+    size = blocks * TORN_TRIANGLES_PER_BLOCK
+    torn = programs.city(
+        f"city-torn-{blocks}",
+        blocks=blocks,
+        triangles=size,
+        texels_per_triangle=TORN_TEXELS,
+        charts=charts,
+    )
+    inputs.append((TORN, size, TORN_TEXELS, [torn]))
     if not arguments.no_real:
         names = REAL[:2] if arguments.quick else REAL
         inputs += [(name, None, None, models) for name in names if (models := real_data(name))]
@@ -77,15 +94,20 @@ def measure_all(programs, arguments, threads):
     for name, size, texels, models in inputs:
         for count in threads:
             say(f"building {name} with {count} thread{'s' if count > 1 else ''}")
-            results = [programs.build(models, "--threads", count) for _ in range(arguments.runs)]
-            results.sort(key=lambda result: result["seconds"])
-            median = results[(len(results) - 1) // 2]
-            median["peak_bytes"] = max(result["peak_bytes"] for result in results)
             runs.append(
                 {"name": name, "size": size, "texels": texels, "threads": count, "models": models}
-                | median
+                | build(programs, arguments, models, count)
             )
     return runs
+
+
+def build(programs, arguments, models, threads):
+    """The median run, with the largest memory of all."""
+    results = [programs.build(models, "--threads", threads) for _ in range(arguments.runs)]
+    results.sort(key=lambda result: result["seconds"])
+    median = results[(len(results) - 1) // 2]
+    median["peak_bytes"] = max(result["peak_bytes"] for result in results)
+    return median
 
 
 def conditions(arguments):
@@ -165,31 +187,51 @@ def scaling(runs, threads):
     return "\n".join(lines)
 
 
-def jpeg_table(programs, arguments, runs, threads):
-    """The build against decoding and encoding the same textures and nothing else."""
+def jpeg_table(programs, arguments, runs):
+    """What textures add to a build against decoding and encoding the same files and nothing else."""
     rows = []
-    for run in (run for run in runs if run["texels"] == THESIS_TEXELS):
-        folder = run["models"][0].parent / "city_textures"
+    for run in (run for run in runs if run["name"] in JPEG):
+        say(f"textures of {run['name']} alone, and its mesh alone")
+        pictures = run["models"][0].parent
+        pictures = pictures / "city_textures" if run["size"] else pictures
         command = [programs.path("examples/jpeg_alone"), "--threads", str(run["threads"])]
         seconds, texels = [], 0
         for _ in range(arguments.runs):
-            text = subprocess.check_output([*command, str(folder)], text=True)
+            text = subprocess.check_output([*command, str(pictures)], text=True)
             found = re.fullmatch(r"(\d+) pictures, (\d+) texels, ([\d.]+) s\n", text)
             texels = int(found.group(2))
             seconds.append(float(found.group(3)))
         alone = statistics.median(seconds)
+        mesh = build(programs, arguments, [untextured(programs, run["models"][0])], run["threads"])
         rows.append(
             [
+                run["name"],
                 str(run["threads"]),
                 f"{texels / 1e6:.1f} M",
                 f"{alone:.2f}",
                 f"{run['seconds']:.2f}",
-                f"{run['seconds'] / alone:.2f} ×",
+                f"{mesh['seconds']:.2f}",
+                f"{(run['seconds'] - mesh['seconds']) / alone:.1f} ×",
             ]
         )
-    head = ["threads", "texels", "JPEG alone, s", "whole build, s", "ratio"]
-    text = f"The city with {THESIS_TEXELS} texels a triangle against decoding and encoding its "
-    return text + "textures, by the same libraries, and nothing else:\n\n" + table(head, rows)
+    head = ["input", "threads", "texels", "JPEG alone, s", "build, s", "without textures, s", "ratio"]
+    text = (
+        "What textures add, that is the build less that of the same mesh without its textures, "
+        "against decoding and encoding their files by the same libraries, and nothing else:\n\n"
+    )
+    return text + table(head, rows)
+
+
+def untextured(programs, model):
+    """A copy of an OBJ whose materials have their colours only."""
+    folder = programs.work / "untextured"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    for material in model.parent.glob("*.mtl"):
+        lines = material.read_text().splitlines(keepends=True)
+        plain = (line for line in lines if not line.lstrip().startswith("map_"))
+        (folder / material.name).write_text("".join(plain))
+    return shutil.copy(model, folder / model.name)
 
 
 if __name__ == "__main__":

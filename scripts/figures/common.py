@@ -20,11 +20,13 @@ DATA = Path(os.environ.get("HLOD_DATA", ROOT.parent / "shared" / "data"))
 REAL = [
     "sceaux",
     "oblique_a",
+    "oblique_b",
     "ingolstadt",
     "torcs_street1",
     "hamada",
     "wageningen",
     "lyon_roads",
+    "lyon_houses",
     "3dfier",
 ]
 

@@ -1,4 +1,4 @@
-"""Draws level 0 of real meshes beside their source; see scripts/levels."""
+"""Draws level 0 of real meshes beside their source, from two distances; see scripts/levels."""
 
 import json
 import shutil
@@ -6,28 +6,27 @@ import subprocess
 
 from common import DOCS, Options, Programs, real_data, run, say, table, write_between_markers
 
-# Folder of the real data and where to look at it from, if not from above its south.
-SETS = {
-    "sceaux": ["--fov", "28"],
-    "oblique_a": ["--fov", "36"],
-    "oblique_b": ["--fov", "36"],
-    "ingolstadt": ["--fov", "36"],
-    "torcs_street1": ["--fov", "40"],
-    "hamada": ["--fov", "36"],
-    "wageningen": ["--fov", "36"],
-    "lyon_roads": ["--fov", "36"],
-    "lyon_houses": ["--fov", "36"],
-    "3dfier": ["--fov", "36"],
-}
-SIZE = "480x360"
+# Folders of the real data.
+SETS = [
+    "sceaux",
+    "oblique_a",
+    "oblique_b",
+    "ingolstadt",
+    "torcs_street1",
+    "hamada",
+    "wageningen",
+    "lyon_roads",
+    "lyon_houses",
+    "3dfier",
+]
 PAGE = DOCS / "levels.md"
 
 
 def main():
     options = Options("levels", __doc__)
-    options.add_argument("--sets", nargs="+", choices=SETS, default=list(SETS), help="[all]")
+    options.add_argument("--sets", nargs="+", choices=SETS, default=SETS, help="[all]")
     arguments = options.parse()
-    examples = ["level_views", "render_scene", "tile_pictures"]
+    examples = ["level_views", "tile_pictures"]
     programs = Programs(examples=examples, features=True)
     for name in arguments.sets:
         if models := real_data(name):
@@ -48,16 +47,14 @@ def section(programs, name, models, write):
     if done.returncode not in (0, 3):
         raise SystemExit(f"exit code {done.returncode} from {' '.join(command)}")
     levels = json.loads(done.stdout)["levels"]
-    views = subprocess.check_output([programs.path("examples/level_views"), str(out)])
-    views = json.loads(views)["levels"]
+    pictures = programs.work / "levels-pictures"
+    shutil.rmtree(pictures, ignore_errors=True)
+    command = [programs.path("examples/level_views"), str(out), "--pictures", str(pictures)]
+    views = json.loads(subprocess.check_output(command))["levels"]
     folder = DOCS / "levels" if write else programs.work
     folder.mkdir(exist_ok=True)
-    pictures = [programs.work / f"levels-{side}.png" for side in ("coarse", "source")]
-    for picture, front in zip(pictures, (["--level", "0"], ["--leaves"])):
-        command = [programs.path("examples/render_scene"), str(out), str(picture), *front]
-        command += ["--size", SIZE, *SETS[name]]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    run([programs.path("examples/tile_pictures"), str(folder / f"{name}.jpg"), *map(str, pictures)])
+    shown = [pictures / of / f"{view}.png" for view in ("far", "quarter") for of in ("level0", "leaves")]
+    run([programs.path("examples/tile_pictures"), str(folder / f"{name}.jpg"), *map(str, shown)])
     shutil.rmtree(out)
     rows = [row(*level) for level in zip(levels, views)]
     picture = f"![{name}: level 0 and the source](levels/{name}.jpg)"

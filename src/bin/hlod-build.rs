@@ -104,8 +104,9 @@ struct BuildArgs {
     #[arg(value_name = "INPUT... OUT", required = true, num_args = 2..)]
     paths: Vec<PathBuf>,
 
-    /// How inputs become blocks: `auto` (groups where they make sense, merged where tiny or one
-    /// surface, divided where huge), `groups`, or `grid:METRES`
+    /// How inputs become blocks: `auto` (groups where they make sense; merged where tiny or one
+    /// surface; divided where huge, or where they have more buildings than a root can show),
+    /// `groups`, or `grid:METRES`
     #[arg(long, value_name = "MODE", default_value = "auto", help_heading = "Hierarchy")]
     blocks: BlockMode,
     /// The shape of the trees
