@@ -32,7 +32,7 @@ TORN_TEXELS = 1000
 TORN = "city of torn charts"
 # What textures add is measured on these.
 JPEG = ["city, 1 M, 105 texels", TORN, "sceaux", "oblique_b"]
-STAGES = ["compare", "import", "gather", "pictures", "cut", "simplify", "measure", "atlas", "write"]
+STAGES = ["compare", "import", "gather", "pictures", "cut", "simplify", "measure", "bake", "atlas", "write"]
 
 
 def main():
