@@ -86,7 +86,7 @@ def measure(programs, arguments, name, out, kind, *options):
     results_dir = programs.work / f"run-{name}-{kind}"
     settle = min(SETTLE, arguments.frames)
     command = [bench, str(out), str(path), "--quiet", "--clock", arguments.clock]
-    command += ["--settle-frames", str(settle), "--out", str(results_dir), *options]
+    command += ["--warm-up-frames", str(settle), "--out", str(results_dir), *options]
     run(command)
     summary = json.loads((results_dir / "summary.json").read_text())
     return {"scene": name, "kind": kind, **summary}

@@ -68,17 +68,17 @@ impl Accuracy {
 }
 
 /// Looks at frames beside a run, which it does not change.
-pub trait Witness {
+pub trait FrameInspector {
     /// Whether it looks at this frame of the path.
     fn wants(&self, index: usize) -> bool;
 
     /// Looks at a frame that is over.
-    fn look(&mut self, frame: Sighting<'_>) -> Result<Accuracy>;
+    fn inspect(&mut self, frame: FrameSample<'_>) -> Result<Accuracy>;
 }
 
 /// A frame that is over.
 #[derive(Debug)]
-pub struct Sighting<'a> {
+pub struct FrameSample<'a> {
     /// Its number in the path.
     pub frame: u64,
     /// The camera.

@@ -3,7 +3,7 @@
 mod accuracy;
 mod clock;
 mod compare;
-mod model;
+mod model_backend;
 mod options;
 mod record;
 #[cfg(feature = "render")]
@@ -20,22 +20,22 @@ mod tests;
 mod wall;
 mod write;
 
-pub use accuracy::{Accuracy, ReferenceContext, Sighting, Witness, WorstFrame};
+pub use accuracy::{Accuracy, FrameInspector, FrameSample, ReferenceContext, WorstFrame};
 pub use clock::{CLOCK_FILE_VERSION, ClockConstants};
 pub use compare::{
     Bytes, Comparison, Count, Dimension, Flip, Limit, Limits, Milliseconds, Points, Row,
     SummaryFile, Unit, compare,
 };
-pub use model::ModelWorld;
+pub use model_backend::ModelBackend;
 pub use options::{BenchOptions, Pace, Size};
 pub use record::FrameRecord;
 #[cfg(feature = "render")]
-pub use reference::{Painter, Reference, SilhouetteTolerance};
-pub use replay::{Drawn, Look, Replay, Run, World, run};
+pub use reference::{Reference, ReferenceRenderer, SilhouetteTolerance};
+pub use replay::{Backend, Drawn, Inspect, Replay, Run, run};
 pub use report::report_html;
 pub use session::Session;
 pub use summary::{Context, SUMMARY_VERSION, summary, summary_text};
 pub use sweep::Sweep;
 #[cfg(feature = "render")]
-pub use wall::{Snapshots, WallWorld, calibrate, measure_start};
+pub use wall::{GpuBackend, Snapshots, calibrate, measure_start};
 pub use write::{check_output, write_run};

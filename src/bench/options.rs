@@ -18,7 +18,7 @@ pub struct BenchOptions {
     /// Width and height of the picture, pixels.
     pub size: Size,
     /// Frames for which the camera stands at the first pose before the log begins.
-    pub settle_frames: u64,
+    pub warm_up_frames: u64,
 }
 
 impl BenchOptions {
@@ -69,8 +69,8 @@ impl BenchOptions {
         {
             return Err(Error::Usage(format!("{name}: expected {range}, found {value}")));
         }
-        if self.residency.portion_bytes == 0 {
-            return Err(Error::Usage("--portion: expected at least 1 byte, found 0".into()));
+        if self.residency.chunk_bytes == 0 {
+            return Err(Error::Usage("--chunk: expected at least 1 byte, found 0".into()));
         }
         Ok(())
     }

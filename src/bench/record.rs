@@ -51,7 +51,7 @@ pub struct FrameRecord {
     pub arrived: u32,
     /// Nodes that are wanted and not in memory.
     pub waiting: u32,
-    /// Nodes that made room during the frame.
+    /// Nodes evicted during the frame.
     pub evictions: u64,
     /// Bytes of the whole process; 0 where that is not measured.
     pub process_bytes: u64,

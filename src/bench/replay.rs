@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use image::RgbaImage;
 
-use super::{BenchOptions, FrameRecord, Pace, Sighting, Witness};
+use super::{BenchOptions, FrameInspector, FrameRecord, FrameSample, Pace};
 use crate::camera::{CameraPath, View};
 use crate::runtime::residency::{Changes, Residency};
 use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection, ToggleCounter};
@@ -14,7 +14,7 @@ use crate::{Error, Result};
 const STALE_PER_FRAME: usize = 64;
 
 /// Where a run takes place: on a graphics card and by the clock on the wall, or in a model of both.
-pub trait World {
+pub trait Backend {
     /// Loads the roots, before the first frame.
     fn load_roots(&mut self, residency: &Mutex<Residency>, roots: &[u32]) -> Result<()>;
 
@@ -46,9 +46,9 @@ pub trait World {
 
     /// Stands still while somebody looks at the frame that was drawn last, with its picture where
     /// there is one: nothing is loaded meanwhile, and nothing of it is left behind.
-    fn aside(&mut self, front: &[u32], view: &View, look: &mut Look<'_>) -> Result<()> {
+    fn pause_for(&mut self, front: &[u32], view: &View, inspect: &mut Inspect<'_>) -> Result<()> {
         let _ = (front, view);
-        look(None)
+        inspect(None)
     }
 
     /// Bytes of the whole process; 0 where that is not measured.
@@ -56,7 +56,7 @@ pub trait World {
 }
 
 /// Looks at a picture, where there is one.
-pub type Look<'a> = dyn FnMut(Option<RgbaImage>) -> Result<()> + 'a;
+pub type Inspect<'a> = dyn FnMut(Option<RgbaImage>) -> Result<()> + 'a;
 
 /// What drawing a frame took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -76,9 +76,9 @@ pub struct Replay<'a> {
     /// What is in memory.
     pub residency: Arc<Mutex<Residency>>,
     /// Where it takes place.
-    pub world: &'a mut dyn World,
+    pub backend: &'a mut dyn Backend,
     /// Who looks at its frames, or nobody.
-    pub witness: Option<&'a mut dyn Witness>,
+    pub inspector: Option<&'a mut dyn FrameInspector>,
     /// What else determines it.
     pub options: BenchOptions,
     /// Number of levels of the scene.
@@ -105,21 +105,21 @@ pub(super) fn lock(residency: &Mutex<Residency>) -> Result<MutexGuard<'_, Reside
 /// false.
 pub fn run(mut replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -> Result<Run> {
     let roots = replay.tree.roots().to_vec();
-    replay.world.load_roots(&replay.residency, &roots)?;
+    replay.backend.load_roots(&replay.residency, &roots)?;
     let mut state = State::new(&replay);
     {
         let residency = lock(&replay.residency)?;
         state.run.start_bytes = residency.used_bytes();
         state.read_bytes = residency.counters().read_bytes;
     }
-    let settle = replay.options.settle_frames;
+    let settle = replay.options.warm_up_frames;
     for _ in 0..settle {
         state.frame(&mut replay, 0)?;
     }
     for index in 0..replay.path.frames.len() {
         let mut record = state.frame(&mut replay, index)?;
-        replay.world.logged(index as u64)?;
-        state.look(&mut replay, index, &mut record)?;
+        replay.backend.logged(index as u64)?;
+        state.inspect(&mut replay, index, &mut record)?;
         let go_on = progress(&record);
         state.run.frames.push(record);
         if !go_on {
@@ -179,15 +179,15 @@ impl State {
             self.residents.set(node, true);
         }
         record.arrived = changes.arrived.len() as u32;
-        record.upload_ms = replay.world.apply(&changes)?;
+        record.upload_ms = replay.backend.apply(&changes)?;
 
-        let before = replay.world.now_ms();
+        let before = replay.backend.now_ms();
         replay.policy.select(replay.tree, &view, &self.residents, &mut self.selection);
-        record.select_ms = replay.world.now_ms() - before;
+        record.select_ms = replay.backend.now_ms() - before;
         self.set_priorities(replay, &view, &mut record)?;
-        replay.world.priorities_set();
+        replay.backend.priorities_set();
 
-        let drawn = replay.world.draw(index as u64, &self.selection.front, &view)?;
+        let drawn = replay.backend.draw(index as u64, &self.selection.front, &view)?;
         record.draw_ms = drawn.draw_ms;
         record.actual_ms = record.select_ms + record.draw_ms;
         record.frame_ms = record.actual_ms + record.upload_ms;
@@ -198,27 +198,28 @@ impl State {
             Pace::Recorded => interval_ms(replay.path, index),
             Pace::Unthrottled => 0.0,
         };
-        replay.world.end_frame(&replay.residency, record.frame_ms, interval_ms)?;
+        replay.backend.end_frame(&replay.residency, record.frame_ms, interval_ms)?;
         self.count(replay, &mut record)?;
         Ok(record)
     }
 
-    /// Lets the witness look at the frame that is over.
-    fn look(
+    /// Lets the inspector look at the frame that is over.
+    fn inspect(
         &mut self,
         replay: &mut Replay<'_>,
         index: usize,
         record: &mut FrameRecord,
     ) -> Result<()> {
         let view = view(replay, index);
-        let Some(witness) = replay.witness.as_mut().filter(|witness| witness.wants(index)) else {
+        let Some(inspector) = replay.inspector.as_mut().filter(|inspector| inspector.wants(index))
+        else {
             return Ok(());
         };
         let before = (record.toggles() > 0).then_some(&self.before[..]);
         let front = &self.selection.front[..];
-        replay.world.aside(front, &view, &mut |drawn| {
-            let sighting = Sighting { frame: record.frame, view: &view, front, before, drawn };
-            record.accuracy = Some(witness.look(sighting)?);
+        replay.backend.pause_for(front, &view, &mut |drawn| {
+            let sample = FrameSample { frame: record.frame, view: &view, front, before, drawn };
+            record.accuracy = Some(inspector.inspect(sample)?);
             Ok(())
         })
     }
@@ -272,7 +273,7 @@ impl State {
         record.memory_bytes = residency.used_bytes();
         record.resident = residency.resident() as u32;
         drop(residency);
-        record.process_bytes = replay.world.process_bytes();
+        record.process_bytes = replay.backend.process_bytes();
         Ok(())
     }
 }

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use super::{
-    BenchOptions, ClockConstants, Context, FrameRecord, ModelWorld, Replay, Run, Witness, run,
+    BenchOptions, ClockConstants, Context, FrameInspector, FrameRecord, ModelBackend, Replay, Run,
+    run,
 };
 use crate::Result;
 use crate::camera::CameraPath;
@@ -74,14 +75,14 @@ impl Session {
         }
     }
 
-    /// Replays a path by the model clock: nothing is drawn unless a `witness` does so, and every
+    /// Replays a path by the model clock: nothing is drawn unless an `inspector` does so, and every
     /// machine gives the same.
     pub fn run_model(
         &self,
         path: &CameraPath,
         mut options: BenchOptions,
         constants: ClockConstants,
-        witness: Option<&mut dyn Witness>,
+        inspector: Option<&mut dyn FrameInspector>,
         progress: impl FnMut(&FrameRecord) -> bool,
     ) -> Result<(Run, Context)> {
         options.selection.time = constants.time_model();
@@ -89,15 +90,15 @@ impl Session {
         let mut policy = Lakhia::new(options.selection);
         let tree = self.tree_for(&constants);
         let context = Context { constants, ..self.context(options, path, &policy) };
-        let mut world = ModelWorld::new(&tree, constants);
+        let mut backend = ModelBackend::new(&tree, constants);
         let replay = Replay {
             tree: &tree,
             path,
             policy: &mut policy,
             residency: self.residency(&options)?,
-            world: &mut world,
-            witness: match witness {
-                Some(witness) => Some(witness), // for as long as this run
+            backend: &mut backend,
+            inspector: match inspector {
+                Some(inspector) => Some(inspector), // for as long as this run
                 None => None,
             },
             options,
@@ -117,7 +118,7 @@ impl Session {
         constants: Option<ClockConstants>,
         renderer: &mut crate::render::Renderer,
         snapshots: Option<super::Snapshots>,
-        witness: Option<&mut dyn Witness>,
+        inspector: Option<&mut dyn FrameInspector>,
         progress: impl FnMut(&FrameRecord) -> bool,
     ) -> Result<(Run, Context)> {
         options.check()?;
@@ -145,23 +146,28 @@ impl Session {
             adapter: Some(adapter),
             ..self.context(options, path, &policy)
         };
-        let mut world =
-            super::WallWorld::new(&tree, self.files(), renderer, Arc::clone(&residency), snapshots);
+        let mut backend = super::GpuBackend::new(
+            &tree,
+            self.files(),
+            renderer,
+            Arc::clone(&residency),
+            snapshots,
+        );
         let replay = Replay {
             tree: &tree,
             path,
             policy: &mut policy,
             residency,
-            world: &mut world,
-            witness: match witness {
-                Some(witness) => Some(witness), // for as long as this run
+            backend: &mut backend,
+            inspector: match inspector {
+                Some(inspector) => Some(inspector), // for as long as this run
                 None => None,
             },
             options,
             levels: self.scene.level_count(),
         };
         let run = run(replay, progress)?;
-        context.broken = world.broken().to_vec();
+        context.broken = backend.broken().to_vec();
         Ok((run, context))
     }
 

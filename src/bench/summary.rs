@@ -290,7 +290,7 @@ pub fn summary_text(summary: &Value) -> String {
     line(
         "loading",
         format!(
-            "{:.1} MiB read, {} nodes arrived, {} made room, {} still wanted at the end",
+            "{:.1} MiB read, {} nodes arrived, {} evicted, {} still wanted at the end",
             mib("/loading/read_bytes"),
             number("/loading/arrived"),
             number("/loading/evictions"),

@@ -71,21 +71,21 @@ fn replay_before(
     scene: &Scene,
     path: &CameraPath,
     options: BenchOptions,
-    witness: Option<&mut dyn Witness>,
+    inspector: Option<&mut dyn FrameInspector>,
 ) -> Run {
     let tree = SceneTree::new(scene);
     let sizes = Sizes::new(scene, |vertices, _, _| u64::from(vertices) * 20, |_| 0);
     let residency = Residency::new(&tree, sizes, options.residency).unwrap();
     let mut policy = Lakhia::new(options.selection);
-    let mut world = ModelWorld::new(&tree, constants());
+    let mut backend = ModelBackend::new(&tree, constants());
     let replay = Replay {
         tree: &tree,
         path,
         policy: &mut policy,
         residency: Arc::new(Mutex::new(residency)),
-        world: &mut world,
-        witness: match witness {
-            Some(witness) => Some(witness),
+        backend: &mut backend,
+        inspector: match inspector {
+            Some(inspector) => Some(inspector),
             None => None,
         },
         options,
@@ -145,7 +145,7 @@ fn loading_reads_no_faster_than_the_clock_allows() {
     let mut bytes = 0;
     for frame in &run.frames {
         bytes += frame.read_bytes;
-        // A portion that was begun is finished.
+        // A chunk that was begun is finished.
         assert!(bytes as f64 <= seconds * 50_000.0 + 50.0 * 34.0 + 1000.0);
         seconds += 1.0 / 30.0;
     }
@@ -176,7 +176,7 @@ fn memory_stays_below_a_cap_of_a_few_nodes_and_is_used() {
 #[test]
 fn frames_of_settling_are_not_logged() {
     let mut options = options(1 << 20);
-    options.settle_frames = 100;
+    options.warm_up_frames = 100;
     let run = replay(&street(20), &walk(10), options);
     assert_eq!(run.frames.len(), 10);
     assert!(run.frames[0].nodes_by_level[1..].iter().sum::<u32>() > 0, "settled before");
@@ -246,12 +246,12 @@ fn a_run_is_written_whole_and_compares_with_itself_and_not_with_another_target()
 #[derive(Default)]
 struct Onlooker(Vec<(u64, Vec<u32>, Option<Vec<u32>>)>);
 
-impl Witness for Onlooker {
+impl FrameInspector for Onlooker {
     fn wants(&self, index: usize) -> bool {
         index.is_multiple_of(3)
     }
 
-    fn look(&mut self, frame: Sighting<'_>) -> crate::Result<Accuracy> {
+    fn inspect(&mut self, frame: FrameSample<'_>) -> crate::Result<Accuracy> {
         assert_eq!(frame.drawn, None, "the model draws nothing");
         self.0.push((frame.frame, frame.front.to_vec(), frame.before.map(<[u32]>::to_vec)));
         Ok(Accuracy { gap_pixels: frame.frame, ..Accuracy::default() })
@@ -261,17 +261,17 @@ impl Witness for Onlooker {
 #[test]
 fn a_witness_sees_every_front_and_changes_nothing_but_its_own_columns() {
     let (scene, path) = (street(20), walk(300));
-    let mut witness = Onlooker::default();
-    let mut watched = replay_before(&scene, &path, options(1 << 20), Some(&mut witness));
+    let mut inspector = Onlooker::default();
+    let mut watched = replay_before(&scene, &path, options(1 << 20), Some(&mut inspector));
     for (index, frame) in watched.frames.iter_mut().enumerate() {
         let expected = index.is_multiple_of(3).then_some(frame.frame);
         assert_eq!(frame.accuracy.take().map(|accuracy| accuracy.gap_pixels), expected);
     }
     assert_eq!(watched, replay(&scene, &path, options(1 << 20)));
-    assert_eq!(witness.0.len(), 100);
+    assert_eq!(inspector.0.len(), 100);
     // Where levels toggled, and only there, it saw the front of the frame before too.
     let mut toggled = 0;
-    for (frame, front, before) in &witness.0 {
+    for (frame, front, before) in &inspector.0 {
         let record = &watched.frames[*frame as usize];
         assert_eq!(front.len() as u32, record.nodes);
         assert_eq!(before.is_some(), record.toggles() > 0);

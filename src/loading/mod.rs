@@ -7,4 +7,4 @@ mod node_files;
 mod thread;
 
 pub use node_files::{Arrival, NodeFiles, Reading};
-pub use thread::{LoadingThread, Still};
+pub use thread::{LoadingThread, PauseGuard};

@@ -1,4 +1,4 @@
-//! The files of a built scene: read in portions, checked, and decoded.
+//! The files of a built scene: read in chunks, checked, and decoded.
 
 use std::fs::File;
 use std::io::Read;

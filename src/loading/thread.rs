@@ -14,7 +14,7 @@ use crate::{Error, Result};
 /// After so long without a word it looks again whether there is something to do.
 const LONGEST_SLEEP: Duration = Duration::from_millis(100);
 
-/// Reads the most important node that is not in memory, in small portions, and looks after each
+/// Reads the most important node that is not in memory, in small chunks, and looks after each
 /// whether another has become more important; that one is then read first, and the other goes on
 /// later where it was.
 #[derive(Debug)]
@@ -30,7 +30,7 @@ struct Shared {
     wake: Condvar,
     stop: Mutex<bool>,
     /// Changed only while `residency` is locked, as is the next.
-    still: AtomicBool,
+    paused: AtomicBool,
     /// A step is under way.
     busy: AtomicBool,
     /// Told when a step is over.
@@ -39,13 +39,13 @@ struct Shared {
 
 /// While this lives, the loading thread does nothing.
 #[derive(Debug)]
-pub struct Still<'a>(&'a Shared);
+pub struct PauseGuard<'a>(&'a Shared);
 
-impl Drop for Still<'_> {
+impl Drop for PauseGuard<'_> {
     fn drop(&mut self) {
         // A thread that died needs no one to tell it to go on.
         if let Ok(_residency) = self.0.residency.lock() {
-            self.0.still.store(false, Ordering::Relaxed);
+            self.0.paused.store(false, Ordering::Relaxed);
         }
         self.0.wake.notify_one();
     }
@@ -68,7 +68,7 @@ impl LoadingThread {
             residency,
             wake: Condvar::new(),
             stop: Mutex::new(false),
-            still: AtomicBool::new(false),
+            paused: AtomicBool::new(false),
             busy: AtomicBool::new(false),
             idle: Condvar::new(),
         });
@@ -87,19 +87,19 @@ impl LoadingThread {
         self.shared.wake.notify_one();
     }
 
-    /// Has the thread stand still, once it is done with the portion that it is reading or the node
+    /// Has the thread stand still, once it is done with the chunk that it is reading or the node
     /// that it is decoding.
-    pub fn still(&self) -> Result<Still<'_>> {
+    pub fn pause(&self) -> Result<PauseGuard<'_>> {
         let died = || Error::Internal("the loading thread died".into());
         let mut residency = self.shared.residency.lock().map_err(|_| died())?;
-        self.shared.still.store(true, Ordering::Relaxed);
-        let still = Still(&self.shared);
+        self.shared.paused.store(true, Ordering::Relaxed);
+        let guard = PauseGuard(&self.shared);
         while self.shared.busy.load(Ordering::Relaxed) && self.check().is_ok() {
             let waited = self.shared.idle.wait_timeout(residency, LONGEST_SLEEP);
             residency = waited.map_err(|_| died())?.0;
         }
         drop(residency);
-        Ok(still)
+        Ok(guard)
     }
 
     /// What arrived since the last call; errors name files that cannot be used. A node comes here
@@ -171,8 +171,8 @@ impl Loader {
             if self.stopped() {
                 return None;
             }
-            let still = self.shared.still.load(Ordering::Relaxed);
-            let step = if still { None } else { residency.next_step() };
+            let paused = self.shared.paused.load(Ordering::Relaxed);
+            let step = if paused { None } else { residency.next_step() };
             // Loads that were given up.
             readings.retain(|&node, _| matches!(residency.state(node), NodeState::Loading { .. }));
             if let Some(step) = step {
@@ -188,7 +188,7 @@ impl Loader {
         }
     }
 
-    /// Reads a portion and decodes the node where it was the last; false at the end.
+    /// Reads a chunk and decodes the node where it was the last; false at the end.
     fn carry_out(
         &self,
         step: Step,
@@ -203,7 +203,7 @@ impl Loader {
                 drop(residency);
                 return self.sender.send(Err(error)).is_ok();
             }
-            residency.portion_read(step.node, step.bytes)
+            residency.chunk_read(step.node, step.bytes)
         };
         if !whole {
             readings.insert(step.node, reading);

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{Adapter, DeviceDescriptor, MemoryHints, PollType, Queue, SubmissionIndex};
 
 use super::adapter::{self, AdapterLabel};
-use super::steady;
+use super::thread_affinity;
 use crate::{Error, Result};
 
 /// A graphics device and what it was last heard to complain of.
@@ -52,7 +52,7 @@ impl Device {
         });
         let label = adapter::label(adapter);
         if label.is_processor {
-            steady::bind_rasteriser_threads();
+            thread_affinity::bind_rasteriser_threads();
         }
         Ok(Self { device, queue, label, complaint })
     }

@@ -28,9 +28,9 @@ mod renderer;
 #[cfg(feature = "render")]
 mod samplers;
 #[cfg(feature = "render")]
-mod steady;
-#[cfg(feature = "render")]
 mod target;
+#[cfg(feature = "render")]
+mod thread_affinity;
 #[cfg(feature = "render")]
 mod warm_up;
 

@@ -3,18 +3,18 @@
 //!
 //! Time enters as an argument, so that a run can be replayed exactly.
 
-mod covered;
 mod front_before;
 pub mod lakhia;
 mod policy;
 pub mod residency;
+mod screen_coverage;
 #[cfg(test)]
 pub(crate) mod test_tree;
 mod toggles;
 mod tree;
 
-pub use covered::{Covered, covered};
 pub use front_before::front_before;
 pub use policy::{FrameOutcome, Policy, Residents, Selection};
+pub use screen_coverage::{ScreenCoverage, covered};
 pub use toggles::{ToggleCounter, Toggles};
 pub use tree::{SceneTree, TreeNode};

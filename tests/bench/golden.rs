@@ -49,7 +49,7 @@ fn a_flight_by_the_model_clock_gives_the_golden_log() {
         .arg("--constants")
         .arg(kept.join("clock.json"))
         .args(["--clock", "model", "--target-ms", "4", "--max-memory", "250KiB"])
-        .args(["--portion", "4KiB", "--out", "r", "-q"])
+        .args(["--chunk", "4KiB", "--out", "r", "-q"])
         .assert()
         .success();
     let found = fs::read(folder.path().join("r/frames.csv")).unwrap();

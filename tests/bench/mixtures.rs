@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use glam::DVec3;
-use hlod::bench::{Accuracy, Reference, Session, Sighting, SilhouetteTolerance, Witness};
+use hlod::bench::{Accuracy, FrameInspector, FrameSample, Reference, Session, SilhouetteTolerance};
 use hlod::camera::{Ground, PathKind, Pose, View, from_angles, make_path};
 use hlod::city::{CityOptions, TextureSize};
 use hlod::mesh::UpAxis;
@@ -111,10 +111,10 @@ fn fronts(tree: &SceneTree) -> Vec<(String, Vec<u32>)> {
     fronts
 }
 
-fn look(reference: &mut Reference, pose: &Pose, front: &[u32]) -> Accuracy {
+fn inspect(reference: &mut Reference, pose: &Pose, front: &[u32]) -> Accuracy {
     let view = View::new(*pose, DVec3::ZERO, SIZE);
-    let sighting = Sighting { frame: 0, view: &view, front, before: None, drawn: None };
-    reference.look(sighting).unwrap()
+    let sample = FrameSample { frame: 0, view: &view, front, before: None, drawn: None };
+    reference.inspect(sample).unwrap()
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn closed_cities_show_no_background_through_any_mixture_of_levels() {
     let (mut surface, mut gaps, mut extra, mut wrong) = (0, 0, 0, Vec::new());
     for (name, front) in fronts(tree) {
         for (number, pose) in poses.iter().enumerate() {
-            let found = look(&mut reference, pose, &front);
+            let found = inspect(&mut reference, pose, &front);
             surface += found.reference_pixels;
             gaps += found.gap_pixels;
             extra += found.extra_pixels;
@@ -148,12 +148,12 @@ fn closed_cities_show_no_background_through_any_mixture_of_levels() {
     let leaves = front(tree, |_| false);
     let (mut caught, mut seen) = (0, 0);
     for pose in &poses {
-        let whole = look(&mut reference, pose, &leaves);
+        let whole = inspect(&mut reference, pose, &leaves);
         assert_eq!((whole.gap_pixels, whole.extra_pixels, whole.flip_mean), (0, 0, 0.0));
         for missing in (0..leaves.len()).step_by(leaves.len() / 5) {
             let mut holed = leaves.clone();
             holed.remove(missing);
-            let found = look(&mut reference, pose, &holed);
+            let found = inspect(&mut reference, pose, &holed);
             seen += u64::from(found.flip_mean > 0.0);
             caught += u64::from(found.inner_gap_pixels > 0);
         }

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use glam::DVec3;
-use hlod::bench::{BenchOptions, ClockConstants, FrameRecord, ModelWorld, Replay, run};
+use hlod::bench::{BenchOptions, ClockConstants, FrameRecord, ModelBackend, Replay, run};
 use hlod::camera::{CameraPath, PathFrame, Pose, from_angles};
 use hlod::format::Scene;
 use hlod::mesh::UpAxis;
@@ -68,14 +68,14 @@ fn replay(scene: &Scene, frames: usize, target_ms: f64) -> Vec<FrameRecord> {
     let sizes = Sizes::new(scene, |vertices, _, _| u64::from(vertices) * 24, |_| 0);
     let residency = Residency::new(&tree, sizes, options.residency).unwrap();
     let mut policy = Lakhia::new(options.selection);
-    let mut world = ModelWorld::new(&tree, constants);
+    let mut backend = ModelBackend::new(&tree, constants);
     let replay = Replay {
         tree: &tree,
         path: &path,
         policy: &mut policy,
         residency: Arc::new(Mutex::new(residency)),
-        world: &mut world,
-        witness: None,
+        backend: &mut backend,
+        inspector: None,
         options,
         levels: scene.level_count(),
     };

@@ -114,7 +114,7 @@ fn where_all_leaves_are_drawn_their_picture_is_that_of_the_reference() {
         "320x180",
         "--target-ms",
         "2000",
-        "--settle-frames",
+        "--warm-up-frames",
         "200",
         "--pace",
         "unthrottled",

@@ -80,7 +80,7 @@ impl Rig {
         for &root in session.tree().roots() {
             let mut residency = residency.lock().unwrap();
             let step = residency.load_root(root);
-            residency.portion_read(root, step.bytes);
+            residency.chunk_read(root, step.bytes);
             match files.read(root, |texture| residency.has_texture(texture)) {
                 Ok(arrival) => {
                     arrived.insert(root, arrival);
@@ -197,12 +197,12 @@ impl Rig {
 }
 
 /// Frames in which priorities stay for a while and then jump; what happened.
-fn storm(session: &Session, nodes: Option<u64>, portion_bytes: u64, seed: u64) -> Counters {
+fn storm(session: &Session, nodes: Option<u64>, chunk_bytes: u64, seed: u64) -> Counters {
     let mut random = Random::new(seed, 0);
     let upload_bytes = random.pick(&[0, 20_000, 1 << 22]);
     let evict_margin = random.pick(&[0.0, 0.1]);
     let options =
-        ResidencyOptions { portion_bytes, upload_bytes, evict_margin, ..Default::default() };
+        ResidencyOptions { chunk_bytes, upload_bytes, evict_margin, ..Default::default() };
     let mut rig = Rig::new(session, nodes, options);
     let mut salt = 0;
     for _ in 0..200 {
@@ -229,7 +229,7 @@ fn promises_hold_under_random_priorities_and_tight_caps() {
     for (scene, name) in [(city(), "city"), (street(), "street")] {
         let session = Session::open(scene).unwrap();
         assert!(session.tree().len() > 20, "{name}: {}", session.tree().len());
-        for (nodes, portion, seed) in [
+        for (nodes, chunk, seed) in [
             (Some(1), 1, 1),
             (Some(1), 64 << 10, 2),
             (Some(3), 7, 3),
@@ -239,8 +239,8 @@ fn promises_hold_under_random_priorities_and_tight_caps() {
             (None, 333, 7),
         ] {
             let session = session.clone();
-            let counters = watched(&format!("{name} {nodes:?} {portion} {seed}"), move || {
-                storm(&session, nodes, portion, seed)
+            let counters = watched(&format!("{name} {nodes:?} {chunk} {seed}"), move || {
+                storm(&session, nodes, chunk, seed)
             });
             sum.read_bytes += counters.read_bytes;
             sum.loads += counters.loads;
@@ -256,10 +256,10 @@ fn promises_hold_under_random_priorities_and_tight_caps() {
 
 #[test]
 fn everything_arrives_where_there_is_room() {
-    for (scene, portion_bytes) in [(city(), 1 << 10), (street(), 1 << 20)] {
+    for (scene, chunk_bytes) in [(city(), 1 << 10), (street(), 1 << 20)] {
         let session = Session::open(scene).unwrap();
         watched("settling", move || {
-            let options = ResidencyOptions { portion_bytes, ..Default::default() };
+            let options = ResidencyOptions { chunk_bytes, ..Default::default() };
             let mut rig = Rig::new(&session, None, options);
             rig.settle(|node| Some(1.0 / f64::from(node + 1)));
             assert_eq!(rig.nodes.len(), rig.tree.len());
@@ -276,7 +276,7 @@ fn a_thread_that_is_dropped_amid_a_load_ends() {
     for frames in [0, 1, 3] {
         let session = session.clone();
         watched("dropping", move || {
-            let options = ResidencyOptions { portion_bytes: 1, ..Default::default() };
+            let options = ResidencyOptions { chunk_bytes: 1, ..Default::default() };
             let mut rig = Rig::new(&session, None, options);
             for _ in 0..frames {
                 rig.frame(|_| Some(1.0));

@@ -16,8 +16,16 @@ const INPUT: i32 = 3;
 const NO_ADAPTER: i32 = 5;
 
 /// Generous: everything affordable is drawn, and loading keeps up with few frames.
-const RUN: [&str; 8] =
-    ["--size", "320x180", "--target-ms", "2000", "--settle-frames", "200", "--pace", "unthrottled"];
+const RUN: [&str; 8] = [
+    "--size",
+    "320x180",
+    "--target-ms",
+    "2000",
+    "--warm-up-frames",
+    "200",
+    "--pace",
+    "unthrottled",
+];
 
 /// Runs; `None` where there is no adapter and none is required.
 fn wall(place: &Place, path: &str, options: &[&str]) -> Option<Assert> {
@@ -75,7 +83,7 @@ fn frames_to_settle_are_not_logged_and_load_what_the_first_frame_needs() {
     let place = Place::new(city());
     let Some(done) = wall(&place, "orbit.csv", &["--out", "settled"]) else { return };
     done.success();
-    let options = ["--settle-frames", "0", "--out", "fresh"];
+    let options = ["--warm-up-frames", "0", "--out", "fresh"];
     let run = ["out", "orbit.csv", "-q", "--size", "320x180", "--target-ms", "2000"];
     place.bench(&[&run[..], &options].concat()).success();
     let [settled, fresh] = ["settled", "fresh"].map(|result| place.frames(result));

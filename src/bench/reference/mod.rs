@@ -1,20 +1,20 @@
 //! What the leaves alone look like, drawn beside a run and outside of its time.
 
-mod painter;
-mod reach;
+mod renderer;
+mod silhouette_tolerance;
 
 use image::{GrayImage, Luma, Rgb, RgbImage, RgbaImage};
 
-use super::accuracy::{Accuracy, ReferenceContext, Sighting, Witness, WorstFrame};
+use super::accuracy::{Accuracy, FrameInspector, FrameSample, ReferenceContext, WorstFrame};
 use super::session::Session;
 use crate::camera::View;
 use crate::picture_error::{Gaps, PIXELS_PER_DEGREE, flip, mean_squared_error, ssim};
 use crate::render::RenderOptions;
 use crate::runtime::{SceneTree, front_before};
 use crate::{Error, Result};
-pub use painter::Painter;
-use reach::Reach;
-pub use reach::SilhouetteTolerance;
+pub use renderer::ReferenceRenderer;
+use silhouette_tolerance::OutlineTolerance;
+pub use silhouette_tolerance::SilhouetteTolerance;
 
 /// Bytes that a reference holds, beside those of the run.
 const CAP_BYTES: u64 = 512 << 20;
@@ -25,7 +25,7 @@ const QUALITY: u8 = 85;
 
 /// Compares every so many frames of a run with the same view of the leaves.
 pub struct Reference {
-    painter: Painter,
+    renderer: ReferenceRenderer,
     leaves: Vec<u32>,
     every: u64,
     tolerance: SilhouetteTolerance,
@@ -44,15 +44,15 @@ impl Reference {
         let tree = session.tree();
         let leaves =
             (0..tree.len() as u32).filter(|&node| tree.children(node).is_empty()).collect();
-        let painter = Painter::new(session, options, CAP_BYTES)?;
-        Ok(Self { painter, leaves, every: every.max(1), tolerance, worst: Vec::new() })
+        let renderer = ReferenceRenderer::new(session, options, CAP_BYTES)?;
+        Ok(Self { renderer, leaves, every: every.max(1), tolerance, worst: Vec::new() })
     }
 
     /// What a summary and a report say of it.
     pub fn context(self) -> Result<ReferenceContext> {
-        let adapter = serde_json::to_value(self.painter.adapter())
+        let adapter = serde_json::to_value(self.renderer.adapter())
             .map_err(|error| Error::Internal(format!("an adapter without JSON form: {error}")))?;
-        let mut broken: Vec<String> = self.painter.broken().cloned().collect();
+        let mut broken: Vec<String> = self.renderer.broken().cloned().collect();
         broken.dedup();
         Ok(ReferenceContext { every: self.every, adapter, broken, worst: self.worst })
     }
@@ -82,29 +82,29 @@ impl Reference {
     }
 }
 
-impl Witness for Reference {
+impl FrameInspector for Reference {
     fn wants(&self, index: usize) -> bool {
         (index as u64).is_multiple_of(self.every)
     }
 
-    fn look(&mut self, sighting: Sighting<'_>) -> Result<Accuracy> {
-        let Sighting { frame, view, front, before, drawn } = sighting;
+    fn inspect(&mut self, sample: FrameSample<'_>) -> Result<Accuracy> {
+        let FrameSample { frame, view, front, before, drawn } = sample;
         let pose = &view.pose;
         let drawn = match drawn {
             Some(drawn) => drawn,
-            None => self.painter.paint(front, pose)?,
+            None => self.renderer.render(front, pose)?,
         };
-        let leaves = seen(self.painter.tree(), &self.leaves, view);
-        let reference = self.painter.paint(&leaves, pose)?;
+        let leaves = seen(self.renderer.tree(), &self.leaves, view);
+        let reference = self.renderer.render(&leaves, pose)?;
         let gaps = Gaps::between(&surface(&reference), &surface(&drawn)).ok_or_else(other_size)?;
         let inner = if gaps.gaps.is_empty() {
             Vec::new()
         } else {
-            let depths = self.painter.depths()?;
-            let reach = Reach::new(self.painter.tree(), front, view, self.tolerance);
+            let depths = self.renderer.depths()?;
+            let outline = OutlineTolerance::new(self.renderer.tree(), front, view, self.tolerance);
             let width = view.size[0] as usize;
             gaps.inner(|[x, y]| {
-                reach.at([x, y], f64::from(depths[y as usize * width + x as usize]))
+                outline.at([x, y], f64::from(depths[y as usize * width + x as usize]))
             })
         };
         let pictures = [&drawn, &reference].map(opaque);
@@ -122,8 +122,8 @@ impl Witness for Reference {
             pop_flip: None,
         };
         if let Some(before) = before {
-            let before = front_before(self.painter.tree(), before, front);
-            let before = opaque(&self.painter.paint(&before, pose)?);
+            let before = front_before(self.renderer.tree(), before, front);
+            let before = opaque(&self.renderer.render(&before, pose)?);
             let pop = flip(&before, picture, PIXELS_PER_DEGREE).ok_or_else(other_size)?;
             accuracy.pop_flip = Some(pop.mean());
         }

@@ -69,7 +69,7 @@ pub(super) fn figures(run: &Run, context: &Context) -> Vec<Figure> {
         },
         Figure {
             number: "",
-            title: "Nodes that arrived and that made room",
+            title: "Nodes that arrived and that were evicted",
             caption: "Nodes that became resident (up) and that were let go (down) in each frame: \
                       many of both at once mean that memory is too small for what is in view."
                 .into(),
@@ -78,7 +78,7 @@ pub(super) fn figures(run: &Run, context: &Context) -> Vec<Figure> {
                 y: axis("nodes a frame", &[&arrived, &evicted]),
                 layers: vec![
                     Layer::new("arrived", BLUE, Shape::Strokes(frame.points(&arrived))),
-                    Layer::new("made room", VERMILLION, Shape::Strokes(frame.points(&evicted))),
+                    Layer::new("evicted", VERMILLION, Shape::Strokes(frame.points(&evicted))),
                 ],
             },
         },

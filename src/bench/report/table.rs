@@ -50,7 +50,7 @@ pub(super) fn groups(summary: &Value) -> Vec<Group> {
                 Row("its share of the cap", share("/memory/peak_share"), "about 93 %"),
                 Row("read from files", mib("/loading/read_bytes"), ""),
                 Row("nodes that arrived", whole("/loading/arrived"), ""),
-                Row("nodes that made room", whole("/loading/evictions"), ""),
+                Row("nodes evicted", whole("/loading/evictions"), ""),
                 Row("still wanted at the end", whole("/loading/waiting_last"), ""),
             ],
         },

@@ -4,9 +4,9 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::backend::near_plane;
 use super::fit::fit;
-use super::stage::Stage;
-use super::world::near_plane;
+use super::measurement_scene::MeasurementScene;
 use crate::Result;
 use crate::bench::statistics::percentile;
 use crate::bench::{CLOCK_FILE_VERSION, ClockConstants};
@@ -59,9 +59,9 @@ struct Sample {
 }
 
 impl Sample {
-    /// Draws nodes that are on the stage; `None` where there are none to draw.
+    /// Draws nodes of the measured scene; `None` where there are none to draw.
     fn measure(
-        stage: &mut Stage<'_>,
+        measured: &mut MeasurementScene<'_>,
         front: &[u32],
         pose: &Pose,
         empty_ms: f64,
@@ -69,14 +69,14 @@ impl Sample {
         if front.is_empty() {
             return Ok(None);
         }
-        let (tree, files) = stage.scene();
+        let (tree, files) = measured.scene();
         let entries = front.iter().map(|&node| &files.scene().nodes[node as usize]);
         let triangles: f64 = entries.clone().map(|node| f64::from(node.triangles)).sum();
         let textured = entries.map(|node| f64::from(node.textured_triangles)).sum();
         let cost = front.iter().map(|&node| tree.node(node).cost).sum();
-        let view = View::new(*pose, DVec3::ZERO, stage.renderer().options().size);
-        let ms = draw_ms(stage.renderer(), front, pose, near_plane(tree))? - empty_ms;
-        let picture = stage.renderer().coverage()?;
+        let view = View::new(*pose, DVec3::ZERO, measured.renderer().options().size);
+        let ms = draw_ms(measured.renderer(), front, pose, near_plane(tree))? - empty_ms;
+        let picture = measured.renderer().coverage()?;
         let drawn = picture.pixels().filter(|pixel| pixel.0[0] > 0).count();
         Ok(Some(Self {
             ms,
@@ -125,20 +125,20 @@ pub fn measure_start(
     files: NodeFiles,
     path: &CameraPath,
 ) -> Result<TimeModel> {
-    let mut stage = Stage::new(tree, files, renderer);
+    let mut measured = MeasurementScene::new(tree, files, renderer);
     // What cannot be read is told of by the run itself.
     let roots: Vec<u32> =
-        tree.roots().iter().copied().filter(|&root| stage.add(root).is_ok()).collect();
+        tree.roots().iter().copied().filter(|&root| measured.add(root).is_ok()).collect();
     let (mut samples, mut fixed) = (Vec::new(), Vec::new());
     for pose in poses(path) {
-        let empty_ms = draw_ms(stage.renderer(), &[], pose, near_plane(tree))?;
+        let empty_ms = draw_ms(measured.renderer(), &[], pose, near_plane(tree))?;
         fixed.push(empty_ms);
-        let seen = seen(tree, &roots, pose, stage.renderer().options().size);
+        let seen = seen(tree, &roots, pose, measured.renderer().options().size);
         for part in [seen.len(), seen.len() / 2, seen.len() / 4] {
-            samples.extend(Sample::measure(&mut stage, &seen[..part], pose, empty_ms)?);
+            samples.extend(Sample::measure(&mut measured, &seen[..part], pose, empty_ms)?);
         }
         let far = far_away(tree, pose);
-        samples.extend(Sample::measure(&mut stage, &roots, &far, empty_ms)?);
+        samples.extend(Sample::measure(&mut measured, &roots, &far, empty_ms)?);
     }
     let terms = samples.iter().map(|sample| sample.relative([sample.cost, sample.covered, 0.0]));
     let [ms_per_cost, fill_ms, _] = fit(&terms.collect::<Vec<_>>());
@@ -182,21 +182,21 @@ pub fn calibrate(
     files: NodeFiles,
     path: &CameraPath,
 ) -> Result<ClockConstants> {
-    let mut stage = Stage::new(tree, files, renderer);
-    let size = stage.renderer().options().size;
+    let mut measured = MeasurementScene::new(tree, files, renderer);
+    let size = measured.renderer().options().size;
     let (mut samples, mut fixed, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
     for pose in poses(path) {
-        let empty_ms = draw_ms(stage.renderer(), &[], pose, near_plane(tree))?;
+        let empty_ms = draw_ms(measured.renderer(), &[], pose, near_plane(tree))?;
         fixed.push(empty_ms);
         for target_ms in TARGETS_MS {
             let front = choose(tree, pose, size, target_ms);
-            stage.show(&front)?;
-            samples.extend(Sample::measure(&mut stage, &front, pose, empty_ms)?);
+            measured.show(&front)?;
+            samples.extend(Sample::measure(&mut measured, &front, pose, empty_ms)?);
             // The same triangles without their pictures.
             if let Some(with) = samples.last().filter(|sample| sample.textured > 0.0) {
                 let with_ms = with.ms;
-                stage.strip(&front)?;
-                let ms = draw_ms(stage.renderer(), &front, pose, near_plane(tree))?;
+                measured.strip(&front)?;
+                let ms = draw_ms(measured.renderer(), &front, pose, near_plane(tree))?;
                 pairs.push([with_ms, ms - empty_ms]);
             }
         }
@@ -222,7 +222,7 @@ pub fn calibrate(
         ms_per_cost: time.ms_per_cost,
         fill_cost: time.fill_cost,
         ms_per_node,
-        load_bytes_per_ms: stage.bytes_per_ms().unwrap_or(defaults.load_bytes_per_ms),
+        load_bytes_per_ms: measured.bytes_per_ms().unwrap_or(defaults.load_bytes_per_ms),
         textured_weight: weight,
     })
 }

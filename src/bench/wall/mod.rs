@@ -1,13 +1,13 @@
 //! Runs on a graphics adapter, by the clock on the wall.
 
+mod backend;
 mod calibrate;
 mod fit;
+mod measurement_scene;
 mod process;
 mod snapshots;
-mod stage;
-mod world;
 
+pub use backend::GpuBackend;
+pub(in crate::bench) use backend::near_plane;
 pub use calibrate::{calibrate, measure_start};
 pub use snapshots::Snapshots;
-pub use world::WallWorld;
-pub(in crate::bench) use world::near_plane;

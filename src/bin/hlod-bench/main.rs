@@ -257,7 +257,7 @@ struct Job<'a> {
 #[cfg(feature = "render")]
 fn run(job: Job) -> Result<(Run, Context)> {
     let Job { arguments, session, path, options, constants, bar } = job;
-    use hlod::bench::{Reference, SilhouetteTolerance, Snapshots, Witness};
+    use hlod::bench::{FrameInspector, Reference, SilhouetteTolerance, Snapshots};
     use hlod::render::{RenderOptions, Renderer, Shading};
     use run_args::ShadingArg;
     let render = RenderOptions {
@@ -278,12 +278,12 @@ fn run(job: Job) -> Result<(Run, Context)> {
     };
     let reference = |every| Reference::new(session, &render, every, tolerance);
     let mut reference = arguments.reference_every.map(reference).transpose()?;
-    let witness = reference.as_mut().map(|reference| reference as &mut dyn Witness);
+    let inspector = reference.as_mut().map(|reference| reference as &mut dyn FrameInspector);
     let progress = |frame: &FrameRecord| bar.frame(frame);
     let (run, mut context) = match arguments.clock {
         Clock::Model => {
             let constants = constants.unwrap_or_default();
-            session.run_model(path, options, constants, witness, progress)?
+            session.run_model(path, options, constants, inspector, progress)?
         }
         Clock::Wall => {
             let mut renderer = Renderer::new(&render)?;
@@ -295,7 +295,7 @@ fn run(job: Job) -> Result<(Run, Context)> {
                 constants,
                 &mut renderer,
                 snapshots,
-                witness,
+                inspector,
                 progress,
             )?
         }

@@ -34,7 +34,7 @@ pub struct RunArgs {
     pub pace: Pace,
     /// Warm-up frames at the first pose, before the log begins
     #[arg(long, value_name = "N", default_value_t = 0)]
-    pub settle_frames: u64,
+    pub warm_up_frames: u64,
     /// Print nothing but errors
     #[arg(long, short)]
     pub quiet: bool,
@@ -93,7 +93,7 @@ pub struct RunArgs {
     pub max_memory: u64,
     /// Chunk of a file that is read before the most important node is determined again, in bytes
     #[arg(long, value_name = "BYTES", default_value = "64KiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
-    pub portion: u64,
+    pub chunk: u64,
     /// Upload limit of a frame in bytes; one node is always uploaded
     #[arg(long, value_name = "BYTES", default_value = "4MiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
     pub upload: u64,
@@ -203,13 +203,13 @@ impl RunArgs {
             },
             residency: ResidencyOptions {
                 max_memory_bytes: self.max_memory,
-                portion_bytes: self.portion,
+                chunk_bytes: self.chunk,
                 upload_bytes: self.upload,
                 evict_margin: self.evict_margin,
             },
             pace: self.pace,
             size: self.size,
-            settle_frames: self.settle_frames,
+            warm_up_frames: self.warm_up_frames,
         }
     }
 }

@@ -52,7 +52,7 @@ fn rig(decode: Decode) -> (tempfile::TempDir, Arc<Mutex<Residency>>, LoadingThre
     let sizes = Sizes::new(&scene, |_, _, _| 100, |_| 0);
     let mut residency = Residency::new(&tree, sizes, ResidencyOptions::default()).unwrap();
     let step = residency.load_root(0);
-    residency.portion_read(0, step.bytes);
+    residency.chunk_read(0, step.bytes);
     residency.loaded(0);
     let residency = Arc::new(Mutex::new(residency));
     let files = NodeFiles::new(folder.path(), Arc::clone(&scene));
@@ -122,13 +122,13 @@ fn nothing_is_loaded_while_the_thread_stands_still_and_all_of_it_afterwards() {
         let residency = residency.lock().unwrap();
         (residency.counters().read_bytes, residency.resident())
     };
-    let still = thread.still().unwrap();
+    let guard = thread.pause().unwrap();
     ask();
     let before = known();
     thread.wake();
     std::thread::sleep(2 * LONGEST_SLEEP);
     assert_eq!(known(), before);
-    drop(still);
+    drop(guard);
     let start = Instant::now();
     while known().1 < 4 && start.elapsed() < PATIENCE {
         ask();
@@ -136,5 +136,5 @@ fn nothing_is_loaded_while_the_thread_stands_still_and_all_of_it_afterwards() {
     }
     assert!(known().0 > before.0 && known().1 == 4);
     // Standing still waits for what is under way, and not for ever.
-    drop(thread.still().unwrap());
+    drop(thread.pause().unwrap());
 }

@@ -11,7 +11,7 @@ const MOST: f64 = 1e150;
 
 /// What a view says of a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct NodeScore {
     /// In view, as far as its box can tell.
     pub visible: bool,
     /// `priority = benefit / cost`; finite and not negative.
@@ -35,7 +35,7 @@ fn frustum_vis(outside: f64, distance: impl FnOnce() -> f64) -> f64 {
 /// `view` is the normal of the image plane towards the eye, so that what faces the camera gains.
 /// The distance is that of the node's box from the camera moved on by its velocity.
 #[inline(always)] // asked for every node: a call each would take a tenth of selection
-pub(super) fn seen(node: &TreeNode, view: &View, options: &LakhiaOptions) -> Seen {
+pub(super) fn score(node: &TreeNode, view: &View, options: &LakhiaOptions) -> NodeScore {
     let eye = view.pose.position;
     let outside = view.frustum.outside(node.bbox);
     let moved = distance(eye + view.velocity * options.lookahead_s, node.bbox);
@@ -45,7 +45,7 @@ pub(super) fn seen(node: &TreeNode, view: &View, options: &LakhiaOptions) -> See
     let foreshorten = 1.0 + options.fore * (-view.frustum.forward).dot(node.average_normal);
     let benefit = node.static_benefit * vis * foreshorten / (distance * distance);
     let priority = if benefit > 0.0 { (benefit / node.cost).min(MOST) } else { 0.0 };
-    Seen { visible: outside <= 0.0, priority }
+    NodeScore { visible: outside <= 0.0, priority }
 }
 
 #[cfg(test)]
@@ -58,7 +58,7 @@ mod tests {
     }
 
     fn priority(sketch: Sketch, view: &View, options: &LakhiaOptions) -> f64 {
-        seen(tree(vec![sketch]).node(0), view, options).priority
+        score(tree(vec![sketch]).node(0), view, options).priority
     }
 
     #[test]

@@ -7,28 +7,29 @@ const LEAST_SHARE: f64 = 0.01;
 
 /// What a frame's siblings will do to the time of later frames, if nothing else changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Outlook {
+pub(super) struct PendingChange {
     /// Milliseconds that siblings will add that are refused by their counters, which rise.
-    pub coming_ms: f64,
+    pub refining_ms: f64,
     /// Milliseconds that the cheapest of the other refused siblings would add; infinite where
     /// there are none.
-    pub refused_ms: f64,
+    pub cheapest_refused_ms: f64,
     /// Milliseconds that siblings will give back whose counters fall.
-    pub going_ms: f64,
+    pub coarsening_ms: f64,
 }
 
-impl Outlook {
+impl PendingChange {
     /// Before any siblings were visited.
-    pub const NONE: Self = Self { coming_ms: 0.0, refused_ms: f64::INFINITY, going_ms: 0.0 };
+    pub const NONE: Self =
+        Self { refining_ms: 0.0, cheapest_refused_ms: f64::INFINITY, coarsening_ms: 0.0 };
 
     /// Siblings in memory were refused that take `more_ms` more than their parent; `rising` says
     /// that their counters are on their way to let them in.
     pub fn refused(&mut self, more_ms: f64, rising: bool) {
         let more_ms = more_ms.max(0.0);
         if rising {
-            self.coming_ms += more_ms;
+            self.refining_ms += more_ms;
         } else {
-            self.refused_ms = self.refused_ms.min(more_ms);
+            self.cheapest_refused_ms = self.cheapest_refused_ms.min(more_ms);
         }
     }
 
@@ -36,7 +37,7 @@ impl Outlook {
     /// that their counters are on their way to shut them out.
     pub fn accepted(&mut self, more_ms: f64, falling: bool) {
         if falling {
-            self.going_ms += more_ms.max(0.0);
+            self.coarsening_ms += more_ms.max(0.0);
         }
     }
 }
@@ -66,7 +67,7 @@ impl Feedback {
         &mut self,
         options: &LakhiaOptions,
         load: f64,
-        outlook: &Outlook,
+        pending: &PendingChange,
         actual_ms: f64,
     ) {
         // The first loop: v_time follows what the frame took.
@@ -82,12 +83,12 @@ impl Feedback {
         // The second: time that is left goes to nodes that could use it.
         let slack = options.share_slack * options.target_ms;
         let left_ms = options.target_ms - actual_ms;
-        let refused = outlook.refused_ms.is_finite() || outlook.coming_ms > 0.0;
+        let refused = pending.cheapest_refused_ms.is_finite() || pending.refining_ms > 0.0;
         let (more, less) = match options.share_feedback {
             ShareFeedback::Plain => (refused && left_ms > slack, left_ms < -slack),
             ShareFeedback::Damped => (
-                outlook.coming_ms + outlook.refused_ms <= left_ms,
-                left_ms + outlook.going_ms < -slack,
+                pending.refining_ms + pending.cheapest_refused_ms <= left_ms,
+                left_ms + pending.coarsening_ms < -slack,
             ),
         };
         if more {
@@ -119,8 +120,9 @@ mod tests {
         LakhiaOptions { time, ..LakhiaOptions::default() }
     }
 
-    const CALM: Outlook = Outlook::NONE;
-    const REFUSED: Outlook = Outlook { refused_ms: 2.0, ..Outlook::NONE };
+    const CALM: PendingChange = PendingChange::NONE;
+    const REFUSED: PendingChange =
+        PendingChange { cheapest_refused_ms: 2.0, ..PendingChange::NONE };
 
     #[test]
     fn v_time_comes_to_what_is_observed() {
@@ -148,11 +150,11 @@ mod tests {
     }
 
     /// `shareTime` after a frame, from 20.
-    fn share(share_feedback: ShareFeedback, outlook: Outlook, actual_ms: f64) -> f64 {
+    fn share(share_feedback: ShareFeedback, pending: PendingChange, actual_ms: f64) -> f64 {
         let options = LakhiaOptions { share_feedback, ..options() };
         let mut feedback = Feedback::new(&options);
         assert_eq!(feedback.share_ms, 20.0);
-        feedback.adjust(&options, 100.0, &outlook, actual_ms);
+        feedback.adjust(&options, 100.0, &pending, actual_ms);
         feedback.share_ms
     }
 
@@ -172,11 +174,11 @@ mod tests {
         assert_eq!(share(Damped, CALM, 12.0), 20.0, "nothing was refused");
         assert_eq!(share(Damped, REFUSED, 27.9), 20.2);
         assert_eq!(share(Damped, REFUSED, 28.1), 20.0, "it would not fit");
-        let coming = Outlook { coming_ms: 5.0, ..REFUSED };
+        let coming = PendingChange { refining_ms: 5.0, ..REFUSED };
         assert_eq!(share(Damped, coming, 22.9), 20.2, "there is room for both");
         assert_eq!(share(Damped, coming, 23.1), 20.0, "what is coming takes the room");
         assert_eq!(share(Damped, CALM, 40.0), 19.8);
-        let going = Outlook { going_ms: 9.0, ..CALM };
+        let going = PendingChange { coarsening_ms: 9.0, ..CALM };
         assert_eq!(share(Damped, going, 40.0), 20.0, "what is going suffices");
         assert_eq!(share(Damped, going, 41.0), 19.8, "what is going does not suffice");
     }

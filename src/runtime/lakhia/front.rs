@@ -4,11 +4,13 @@ use std::collections::VecDeque;
 use std::ops::Range;
 
 use super::LakhiaOptions;
-use super::benefit::{Seen, seen};
-use super::feedback::{Feedback, Outlook};
+use super::benefit::{NodeScore, score};
+use super::feedback::{Feedback, PendingChange};
 use super::hysteresis::Hysteresis;
 use crate::camera::View;
-use crate::runtime::{Covered, FrameOutcome, Policy, Residents, SceneTree, Selection, TreeNode};
+use crate::runtime::{
+    FrameOutcome, Policy, Residents, SceneTree, ScreenCoverage, Selection, TreeNode,
+};
 
 /// The policy of Lakhia's thesis.
 #[derive(Clone, Debug)]
@@ -19,14 +21,14 @@ pub struct Lakhia {
     /// Cost of the front that was chosen last.
     cost: f64,
     /// The part of the picture that it covers, 0 to 1.
-    covered: Covered,
+    covered: ScreenCoverage,
     /// What its siblings would do to later frames.
-    outlook: Outlook,
+    pending: PendingChange,
     /// Milliseconds of this frame that nodes met for the first time may still take.
     room_ms: f64,
     queue: VecDeque<Siblings>,
     /// The siblings at hand.
-    seen: Vec<Seen>,
+    scores: Vec<NodeScore>,
 }
 
 /// Frames within which refused siblings count as coming: their time is not given to others.
@@ -73,11 +75,11 @@ impl Lakhia {
             options,
             hysteresis: Hysteresis::default(),
             cost: 0.0,
-            covered: Covered::default(),
-            outlook: Outlook::NONE,
+            covered: ScreenCoverage::default(),
+            pending: PendingChange::NONE,
             room_ms: 0.0,
             queue: VecDeque::new(),
-            seen: Vec::new(),
+            scores: Vec::new(),
         }
     }
 
@@ -93,35 +95,36 @@ impl Lakhia {
     ) {
         let (indices, nodes) = tree.at(siblings.places.clone());
         let mut sums = Sums::default();
-        self.seen.clear();
+        self.scores.clear();
         for node in nodes {
-            let seen = seen(node, view, &self.options);
-            if seen.visible {
-                sums.priority += seen.priority;
+            let scored = score(node, view, &self.options);
+            if scored.visible {
+                sums.priority += scored.priority;
                 sums.visible += 1;
                 sums.needed_ms += self.time_needed(node);
             }
-            self.seen.push(seen);
+            self.scores.push(scored);
         }
         out.culled += (nodes.len() - sums.visible) as u32;
-        let priorities = indices.iter().zip(&self.seen).map(|(&node, seen)| (node, seen.priority));
+        let priorities =
+            indices.iter().zip(&self.scores).map(|(&node, scored)| (node, scored.priority));
         out.priorities.extend(priorities);
         let parent = siblings.parent.map(|place| tree.at(place..place + 1));
         let parent = parent.map(|(index, node)| (index[0], &node[0]));
         self.start_counters(&siblings, sums, parent.map(|(_, node)| node));
         let allowed = self.update_counters(nodes, &siblings, sums);
         if let Some((index, node)) = parent {
-            let resident = indices.iter().zip(&self.seen).all(|(&node, seen)| {
-                residents.contains(node) || !(seen.visible || self.options.all_siblings)
+            let resident = indices.iter().zip(&self.scores).all(|(&node, scored)| {
+                residents.contains(node) || !(scored.visible || self.options.all_siblings)
             });
             if resident {
                 let more_ms = sums.needed_ms - self.time_needed(node);
                 if allowed {
                     let falling = self.counted_in(GOING, nodes, &siblings, sums) < 0.0;
-                    self.outlook.accepted(more_ms, falling);
+                    self.pending.accepted(more_ms, falling);
                 } else {
                     let rising = self.counted_in(COMING, nodes, &siblings, sums) >= 0.0;
-                    self.outlook.refused(more_ms, rising);
+                    self.pending.refused(more_ms, rising);
                 }
             }
             if !(resident && allowed) {
@@ -131,7 +134,7 @@ impl Lakhia {
         // Roots have no parent that could stand for them: far ones that need more than their
         // share do not keep the near ones from going on.
         for (at, (&index, node)) in indices.iter().zip(nodes).enumerate() {
-            let Seen { visible, priority } = self.seen[at];
+            let NodeScore { visible, priority } = self.scores[at];
             // A root whose file is broken is not there; others come this far only when they are.
             if !visible || !(parent.is_some() || residents.contains(index)) {
                 continue;
@@ -150,8 +153,9 @@ impl Lakhia {
 
     /// Begins the counters of siblings that are in view for the first time.
     fn start_counters(&mut self, siblings: &Siblings, sums: Sums, parent: Option<&TreeNode>) {
-        let is_new = |place: u32, seen: &Seen| seen.visible && self.hysteresis.is_new(place);
-        if !siblings.places.clone().zip(&self.seen).any(|(place, seen)| is_new(place, seen)) {
+        let is_new =
+            |place: u32, scored: &NodeScore| scored.visible && self.hysteresis.is_new(place);
+        if !siblings.places.clone().zip(&self.scores).any(|(place, scored)| is_new(place, scored)) {
             return;
         }
         let more_ms = sums.needed_ms - parent.map_or(0.0, |parent| self.time_needed(parent));
@@ -159,8 +163,8 @@ impl Lakhia {
         if affordable {
             self.room_ms -= more_ms.max(0.0);
         }
-        for (place, seen) in siblings.places.clone().zip(&self.seen) {
-            if seen.visible && self.hysteresis.is_new(place) {
+        for (place, scored) in siblings.places.clone().zip(&self.scores) {
+            if scored.visible && self.hysteresis.is_new(place) {
                 self.hysteresis.start(place, affordable, &self.options);
             }
         }
@@ -169,9 +173,9 @@ impl Lakhia {
     /// Time slices (eq. 4.1) against the time needed; true where `cumHyst` is not below 0.
     fn update_counters(&mut self, nodes: &[TreeNode], siblings: &Siblings, sums: Sums) -> bool {
         let mut cumulative = 0.0;
-        for ((place, node), seen) in siblings.places.clone().zip(nodes).zip(&self.seen) {
-            if seen.visible {
-                let time_slice = siblings.share_ms * sums.share(seen.priority);
+        for ((place, node), scored) in siblings.places.clone().zip(nodes).zip(&self.scores) {
+            if scored.visible {
+                let time_slice = siblings.share_ms * sums.share(scored.priority);
                 let time_needed = self.time_needed(node);
                 self.hysteresis.update(place, time_slice, time_needed, self.options.hyst_limit);
                 cumulative += self.hysteresis.truncated(place, 0.0, &self.options);
@@ -183,9 +187,9 @@ impl Lakhia {
     /// `cumHyst` so many frames from now, if nothing else changes.
     fn counted_in(&self, frames: f64, nodes: &[TreeNode], siblings: &Siblings, sums: Sums) -> f64 {
         let mut cumulative = 0.0;
-        for ((place, node), seen) in siblings.places.clone().zip(nodes).zip(&self.seen) {
-            if seen.visible {
-                let time_slice = siblings.share_ms * sums.share(seen.priority);
+        for ((place, node), scored) in siblings.places.clone().zip(nodes).zip(&self.scores) {
+            if scored.visible {
+                let time_slice = siblings.share_ms * sums.share(scored.priority);
                 let urgency = time_slice / self.time_needed(node) - 1.0;
                 cumulative += self.hysteresis.truncated(place, urgency * frames, &self.options);
             }
@@ -227,7 +231,8 @@ impl Policy for Lakhia {
         self.hysteresis.resize(tree.len());
         let before_ms = self.feedback.fixed_ms + self.feedback.v_time * self.load();
         self.room_ms = self.options.target_ms - before_ms;
-        (self.cost, self.covered, self.outlook) = (0.0, Covered::default(), Outlook::NONE);
+        (self.cost, self.covered, self.pending) =
+            (0.0, ScreenCoverage::default(), PendingChange::NONE);
         self.queue.clear();
         self.queue.push_back(Siblings {
             places: tree.root_places(),
@@ -247,10 +252,10 @@ impl Policy for Lakhia {
     }
 
     fn priority(&self, tree: &SceneTree, node: u32, view: &View) -> f64 {
-        seen(tree.node(node), view, &self.options).priority
+        score(tree.node(node), view, &self.options).priority
     }
 
     fn drawn(&mut self, outcome: &FrameOutcome) {
-        self.feedback.adjust(&self.options, self.load(), &self.outlook, outcome.actual_ms);
+        self.feedback.adjust(&self.options, self.load(), &self.pending, outcome.actual_ms);
     }
 }

@@ -1,9 +1,9 @@
-//! What is loaded next, and what makes room for it.
+//! What is loaded next, and what is evicted for it.
 
-use super::ledger::Ledger;
-use super::room::Promises;
+use super::eviction::Reservations;
+use super::memory_budget::MemoryBudget;
+use super::recent_priority::RecentPriority;
 use super::state::{Counters, NodeState, Residency};
-use super::worth::Worth;
 use super::{PriorityList, ResidencyOptions, Sizes};
 use crate::runtime::SceneTree;
 use crate::{Error, Result};
@@ -11,7 +11,7 @@ use crate::{Error, Result};
 /// How many nodes are tried, in order of priority, before loading waits for memory.
 const CANDIDATES: usize = 16;
 
-/// A portion to be read: bytes `from..from + bytes` of the node's file followed by those of the
+/// A chunk to be read: bytes `from..from + bytes` of the node's file followed by those of the
 /// shared pictures that it needs and that are not in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
@@ -40,7 +40,7 @@ impl Residency {
     pub fn new(tree: &SceneTree, sizes: Sizes, options: ResidencyOptions) -> Result<Self> {
         let nodes = tree.len();
         let residency = Self {
-            ledger: Ledger::new(options.max_memory_bytes, sizes.textures.len()),
+            budget: MemoryBudget::new(options.max_memory_bytes, sizes.textures.len()),
             list: PriorityList::new(nodes),
             states: vec![NodeState::Absent; nodes],
             parents: (0..nodes as u32).map(|node| tree.node(node).parent).collect(),
@@ -48,7 +48,7 @@ impl Residency {
             to_read: vec![0; nodes],
             textures_held: vec![false; sizes.textures.len()],
             visited: vec![0; nodes],
-            worth: Worth::new(nodes),
+            recent_priority: RecentPriority::new(nodes),
             needed: vec![0; nodes],
             frame: 0,
             missed: Vec::new(),
@@ -78,13 +78,13 @@ impl Residency {
 
     /// Bytes that all roots take, the largest of them while its files are read.
     fn bytes_for_roots(&self, tree: &SceneTree) -> u64 {
-        let mut ledger = Ledger::new(u64::MAX, self.sizes.textures.len());
+        let mut budget = MemoryBudget::new(u64::MAX, self.sizes.textures.len());
         for &root in tree.roots() {
             let read = self.files(root, &vec![false; self.sizes.textures.len()]);
-            ledger.reserve(&self.sizes, root, read);
-            ledger.release_read(read);
+            budget.reserve(&self.sizes, root, read);
+            budget.release_read(read);
         }
-        ledger.peak()
+        budget.peak()
     }
 
     /// Nodes that the last frame visited and found not in memory, and that still are not: how many
@@ -114,7 +114,7 @@ impl Residency {
                 self.needed[parent as usize] = self.frame;
             }
         }
-        self.worth.update(self.frame, visited);
+        self.recent_priority.update(self.frame, visited);
         self.list.update(visited);
         self.list.update(others);
     }
@@ -144,12 +144,12 @@ impl Residency {
         }
     }
 
-    /// What to read now: a portion of the most important node that is not in memory and for
+    /// What to read now: a chunk of the most important node that is not in memory and for
     /// which there is room or can be made. `None` where there is nothing to do until something
     /// changes.
     pub fn next_step(&mut self) -> Option<Step> {
         let mut at = self.list.first_unloaded();
-        let mut promises = Promises::default();
+        let mut reservations = Reservations::default();
         while let Some(node) = at {
             at = self.list.after(node);
             let state = self.states[node as usize];
@@ -157,16 +157,16 @@ impl Residency {
                 NodeState::Absent if self.visited[node as usize] != self.frame => {
                     self.list.remove(node); // no longer of interest to anyone
                 }
-                NodeState::Absent if self.wants(node) && self.make_room(node, &mut promises) => {
+                NodeState::Absent if self.wants(node) && self.reserve(node, &mut reservations) => {
                     self.begin(node);
-                    return Some(self.portion(node));
+                    return Some(self.chunk(node));
                 }
                 NodeState::Loading { .. } if self.visited[node as usize] == self.frame => {
-                    return Some(self.portion(node));
+                    return Some(self.chunk(node));
                 }
                 _ => {}
             }
-            if promises.tried == CANDIDATES {
+            if reservations.tried == CANDIDATES {
                 break;
             }
         }
@@ -182,7 +182,7 @@ impl Residency {
         outside && parent_resident && self.visited[node as usize] == self.frame
     }
 
-    fn portion(&mut self, node: u32) -> Step {
+    fn chunk(&mut self, node: u32) -> Step {
         let NodeState::Loading { read } = self.states[node as usize] else {
             return Step { node, from: 0, bytes: 0 };
         };
@@ -192,12 +192,12 @@ impl Residency {
         }
         self.current = Some(node);
         let left = self.to_read[node as usize] - read;
-        Step { node, from: read, bytes: left.min(self.options.portion_bytes) }
+        Step { node, from: read, bytes: left.min(self.options.chunk_bytes) }
     }
 
-    /// A portion was read; true where it was the last, after which [`loaded`](Self::loaded) or
+    /// A chunk was read; true where it was the last, after which [`loaded`](Self::loaded) or
     /// [`broken`](Self::broken) is to be called. False too where the load was given up meanwhile.
-    pub fn portion_read(&mut self, node: u32, bytes: u64) -> bool {
+    pub fn chunk_read(&mut self, node: u32, bytes: u64) -> bool {
         let NodeState::Loading { read } = &mut self.states[node as usize] else { return false };
         *read += bytes;
         self.counters.read_bytes += bytes;
@@ -241,7 +241,7 @@ impl Residency {
         for texture in std::mem::take(&mut self.orphans) {
             // Unless another load has come to need it since.
             let held = &mut self.textures_held[texture as usize];
-            self.ledger.release_texture(&self.sizes, texture, |texture| {
+            self.budget.release_texture(&self.sizes, texture, |texture| {
                 *held = false;
                 changes.left_textures.push(texture);
             });

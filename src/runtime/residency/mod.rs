@@ -1,17 +1,17 @@
-//! Which nodes are in memory (thesis, section 4.3): what is loaded next, what makes room for it,
+//! Which nodes are in memory (thesis, section 4.3): what is loaded next, what is evicted for it,
 //! and a cap that is never exceeded. No files and no threads: whoever loads asks what to read and
 //! tells what was read.
 
-mod ledger;
+mod eviction;
 mod list;
 mod manager;
+mod memory_budget;
 mod options;
-mod room;
+mod recent_priority;
 mod sizes;
 mod state;
 #[cfg(test)]
 mod tests;
-mod worth;
 
 pub use list::PriorityList;
 pub use manager::{Changes, Step};

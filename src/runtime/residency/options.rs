@@ -6,10 +6,10 @@ pub struct ResidencyOptions {
     /// `maxMemory`: bytes that everything in memory takes at most, loads under way included.
     pub max_memory_bytes: u64,
     /// Bytes that are read before the list is looked at again, at least 1.
-    pub portion_bytes: u64,
+    pub chunk_bytes: u64,
     /// Bytes of nodes that become resident in one frame; at least one node does.
     pub upload_bytes: u64,
-    /// A node makes room for another only where that one's priority is higher by this part, so
+    /// A node is evicted for another only where that one's priority is higher by this part, so
     /// that two of nearly the same do not push each other out in turn; at least 0.
     pub evict_margin: f64,
 }
@@ -18,7 +18,7 @@ impl Default for ResidencyOptions {
     fn default() -> Self {
         Self {
             max_memory_bytes: 1 << 30,
-            portion_bytes: 64 << 10,
+            chunk_bytes: 64 << 10,
             upload_bytes: 4 << 20,
             evict_margin: 0.1,
         }

@@ -1,7 +1,7 @@
 //! Which nodes are in memory, and what they hold there.
 
-use super::ledger::Ledger;
-use super::worth::Worth;
+use super::memory_budget::MemoryBudget;
+use super::recent_priority::RecentPriority;
 use super::{PriorityList, ResidencyOptions, Sizes};
 
 /// Where a node is.
@@ -31,7 +31,7 @@ pub struct Counters {
     pub read_bytes: u64,
     /// Nodes that were loaded.
     pub loads: u64,
-    /// Nodes that made room.
+    /// Nodes that were evicted.
     pub evictions: u64,
     /// Loads that were suspended for a more important one.
     pub suspensions: u64,
@@ -41,14 +41,14 @@ pub struct Counters {
 
 /// Which nodes are in memory.
 ///
-/// A node is loaded only once its parent is resident, and makes room only once none of its
+/// A node is loaded only once its parent is resident, and evicted only once none of its
 /// children is in memory, so that whatever is drawn can always be replaced by its parent. Roots
 /// never leave.
 #[derive(Clone, Debug)]
 pub struct Residency {
     pub(super) options: ResidencyOptions,
     pub(super) sizes: Sizes,
-    pub(super) ledger: Ledger,
+    pub(super) budget: MemoryBudget,
     pub(super) list: PriorityList,
     pub(super) states: Vec<NodeState>,
     pub(super) parents: Vec<Option<u32>>,
@@ -60,7 +60,7 @@ pub struct Residency {
     pub(super) textures_held: Vec<bool>,
     /// By node: the frame in which it was visited last.
     pub(super) visited: Vec<u64>,
-    pub(super) worth: Worth,
+    pub(super) recent_priority: RecentPriority,
     /// By node: the last frame in which it was drawn, or its children were visited in its place.
     pub(super) needed: Vec<u64>,
     pub(super) frame: u64,
@@ -75,7 +75,7 @@ pub struct Residency {
     pub(super) orphans: Vec<u32>,
     /// Being read or suspended.
     pub(super) loading: Vec<u32>,
-    /// The load that was given the last portion.
+    /// The load that was given the last chunk.
     pub(super) current: Option<u32>,
     pub(super) resident: usize,
     /// Where [`Residency::stale`] goes on.
@@ -102,12 +102,12 @@ impl Residency {
 
     /// Bytes in use: held for drawing, decoded, and read by loads under way.
     pub fn used_bytes(&self) -> u64 {
-        self.ledger.used()
+        self.budget.used()
     }
 
     /// The most bytes that were ever in use.
     pub fn peak_bytes(&self) -> u64 {
-        self.ledger.peak()
+        self.budget.peak()
     }
 
     /// Number of nodes that can be drawn.
@@ -130,7 +130,7 @@ impl Residency {
     pub(super) fn begin(&mut self, node: u32) {
         let read = self.files(node, &self.textures_held);
         self.to_read[node as usize] = read;
-        self.ledger.reserve(&self.sizes, node, read);
+        self.budget.reserve(&self.sizes, node, read);
         self.states[node as usize] = NodeState::Loading { read: 0 };
         self.loading.push(node);
         if let Some(parent) = self.parents[node as usize] {
@@ -139,14 +139,14 @@ impl Residency {
     }
 
     pub(super) fn end_reading(&mut self, node: u32) {
-        self.ledger.release_read(self.to_read[node as usize]);
+        self.budget.release_read(self.to_read[node as usize]);
         self.loading.retain(|&other| other != node);
     }
 
     /// Gives back what was reserved for a load that will not be finished.
     pub(super) fn forget_load(&mut self, node: u32, state: NodeState) {
         let (held, orphans) = (&self.textures_held, &mut self.orphans);
-        self.ledger.release_load(&self.sizes, node, held, orphans);
+        self.budget.release_load(&self.sizes, node, held, orphans);
         self.states[node as usize] = state;
         if let Some(parent) = self.parents[node as usize] {
             self.children_held[parent as usize] -= 1;
@@ -156,7 +156,7 @@ impl Residency {
     /// Gives back what a node held.
     pub(super) fn forget(&mut self, node: u32, state: NodeState, gone: &mut Vec<u32>) {
         let held = &mut self.textures_held;
-        self.ledger.release(&self.sizes, node, |texture| {
+        self.budget.release(&self.sizes, node, |texture| {
             if std::mem::take(&mut held[texture as usize]) {
                 gone.push(texture);
             }

@@ -14,7 +14,7 @@ fn sizes(nodes: usize) -> Sizes {
 }
 
 fn options(max_memory_bytes: u64) -> ResidencyOptions {
-    ResidencyOptions { max_memory_bytes, portion_bytes: 400, ..ResidencyOptions::default() }
+    ResidencyOptions { max_memory_bytes, chunk_bytes: 400, ..ResidencyOptions::default() }
 }
 
 fn leaf() -> Sketch {
@@ -31,14 +31,14 @@ fn started(tree: &SceneTree, sizes: Sizes, options: ResidencyOptions) -> Residen
     let mut residency = Residency::new(tree, sizes, options).unwrap();
     for &root in tree.roots() {
         let step = residency.load_root(root);
-        assert!(residency.portion_read(root, step.bytes));
+        assert!(residency.chunk_read(root, step.bytes));
         residency.loaded(root);
     }
     assert_eq!(residency.begin_frame().arrived, tree.roots());
     residency
 }
 
-/// Promises that hold at any time, recomputed.
+/// Invariants of residency, recomputed.
 fn check(residency: &Residency, tree: &SceneTree, sizes: &Sizes, cap: u64) {
     assert!(residency.used_bytes() <= cap && residency.peak_bytes() <= cap);
     let mut used = 0;
@@ -72,7 +72,7 @@ fn check(residency: &Residency, tree: &SceneTree, sizes: &Sizes, cap: u64) {
 fn load_all(residency: &mut Residency) -> Vec<u32> {
     let mut loaded = Vec::new();
     while let Some(step) = residency.next_step() {
-        if residency.portion_read(step.node, step.bytes) {
+        if residency.chunk_read(step.node, step.bytes) {
             residency.loaded(step.node);
             loaded.push(step.node);
         }
@@ -111,16 +111,16 @@ fn a_load_is_suspended_for_a_more_important_one_and_resumed() {
     residency.set_priorities(&[(0, 9.0), (1, 3.0), (4, 2.0)], &[]);
     let step = residency.next_step().unwrap();
     assert_eq!(step, Step { node: 1, from: 0, bytes: 400 });
-    assert!(!residency.portion_read(1, 400));
+    assert!(!residency.chunk_read(1, 400));
     residency.set_priorities(&[(0, 9.0), (1, 3.0), (4, 4.0)], &[]);
     assert_eq!(residency.next_step(), Some(Step { node: 4, from: 0, bytes: 400 }));
     assert_eq!(residency.state(1), NodeState::Loading { read: 400 });
     assert_eq!(residency.counters().suspensions, 1);
     residency.set_priorities(&[(0, 9.0), (1, 5.0), (4, 4.0)], &[]);
     assert_eq!(residency.next_step(), Some(Step { node: 1, from: 400, bytes: 400 }));
-    assert!(!residency.portion_read(1, 400));
+    assert!(!residency.chunk_read(1, 400));
     assert_eq!(residency.next_step(), Some(Step { node: 1, from: 800, bytes: 200 }));
-    assert!(residency.portion_read(1, 200));
+    assert!(residency.chunk_read(1, 200));
 }
 
 #[test]
@@ -134,7 +134,7 @@ fn what_is_no_longer_visited_is_not_loaded() {
 }
 
 #[test]
-fn the_cap_holds_and_less_important_nodes_make_room() {
+fn the_cap_holds_and_less_important_nodes_are_evicted() {
     let tree = two_levels();
     // Root, one more held, and the file of a third.
     let cap = 2 * HELD + HELD + FILE;
@@ -181,7 +181,7 @@ fn nearly_equal_priorities_do_not_push_each_other_out() {
 }
 
 #[test]
-fn room_is_not_made_in_vain() {
+fn nothing_is_evicted_in_vain() {
     let tree = two_levels();
     let mut sizes = sizes(7);
     sizes.nodes[4].held_bytes = 1 << 20;
@@ -271,7 +271,7 @@ fn nodes_in_memory_that_nobody_visits_come_up_in_turn() {
     assert_eq!(seen.into_iter().collect::<Vec<_>>(), [2, 3, 5, 6]);
 }
 
-/// Random priorities, portions, failures and frames: every promise at every step.
+/// Random priorities, chunks, failures and frames: every promise at every step.
 #[test]
 fn promises_hold_whatever_happens() {
     let mut numbers = Random::new(7, 0);
@@ -317,7 +317,7 @@ fn promises_hold_whatever_happens() {
                 _ => {
                     if let Some(step) = residency.next_step() {
                         check(&residency, &tree, &sizes, cap);
-                        if residency.portion_read(step.node, step.bytes) {
+                        if residency.chunk_read(step.node, step.bytes) {
                             match random(12) {
                                 0 => residency.broken(step.node),
                                 _ => residency.loaded(step.node),
@@ -352,7 +352,7 @@ fn pictures_that_only_a_load_kept_are_let_go_of_when_it_is_given_up() {
     residency.set_priorities(&[(0, 9.0), (2, 7.9)], &[(1, 0.1)]);
     assert_eq!(residency.next_step().map(|step| step.node), Some(2));
     assert_eq!(residency.files_of_load(2), FILE);
-    // The child that brought it makes room for a third.
+    // The child that brought it is evicted for a third.
     residency.set_priorities(&[(0, 9.0), (2, 7.9), (3, 8.0)], &[(1, 0.1)]);
     assert_eq!(residency.next_step().map(|step| step.node), Some(2));
     assert_eq!(residency.state(1), NodeState::Leaving);
@@ -388,7 +388,7 @@ fn select(
     (visited, front)
 }
 
-/// Frames of a camera that stands still; what was loaded and made room in each.
+/// Frames of a camera that stands still; what was loaded and evicted in each.
 fn stand(tree: &SceneTree, residency: &mut Residency, priority: &[f64], frames: usize) -> Vec<u64> {
     (0..frames)
         .map(|_| {
@@ -419,7 +419,7 @@ fn a_node_does_not_push_out_what_selection_comes_to_it_by() {
 }
 
 #[test]
-fn room_is_made_for_several_nodes_in_a_frame() {
+fn a_frame_evicts_for_several_nodes() {
     let tree = tree(vec![sketch([0.0; 3], 1.0, (0..8).map(|_| leaf()).collect())]);
     // Room for the root and four children, and to read four more at once.
     let cap = 5 * HELD + 4 * FILE;

@@ -9,9 +9,9 @@ use crate::camera::View;
 /// under each box, and never more than all of it, since little of what is hidden is shaded when
 /// near nodes are drawn first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Covered(f64);
+pub struct ScreenCoverage(f64);
 
-impl Covered {
+impl ScreenCoverage {
     /// One node more is drawn.
     pub fn add(&mut self, bbox: [DVec3; 2], view: &View) {
         // Once all of the picture is covered, boxes need not be looked at.
@@ -28,7 +28,7 @@ impl Covered {
 
 /// The part of the picture that nodes cover, 0 to 1.
 pub fn covered(tree: &SceneTree, front: &[u32], view: &View) -> f64 {
-    let mut sum = Covered::default();
+    let mut sum = ScreenCoverage::default();
     front.iter().for_each(|&node| sum.add(tree.node(node).bbox, view));
     sum.part()
 }

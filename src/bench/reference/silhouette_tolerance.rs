@@ -21,7 +21,7 @@ impl Default for SilhouetteTolerance {
 }
 
 /// For pixels of one view, how many pixels the levels drawn there may be off.
-pub(super) struct Reach {
+pub(super) struct OutlineTolerance {
     tolerance: SilhouetteTolerance,
     view: View,
     /// Boxes of the nodes drawn, each as much larger as its node may be off, and by how much.
@@ -30,7 +30,7 @@ pub(super) struct Reach {
     steps: [DVec3; 2],
 }
 
-impl Reach {
+impl OutlineTolerance {
     pub fn new(
         tree: &SceneTree,
         front: &[u32],
@@ -97,17 +97,18 @@ mod tests {
         let pose = Pose { position: DVec3::ZERO, rotation: DQuat::IDENTITY, fov_y_deg: 90.0 };
         let view = View::new(pose, DVec3::ZERO, [400, 200]);
         let tolerance = SilhouetteTolerance { most_error_pixels: 1.12, ..Default::default() };
-        let reach = Reach::new(&tree, &[0, 1, 2], &view, tolerance);
+        let outline = OutlineTolerance::new(&tree, &[0, 1, 2], &view, tolerance);
         // 100 pixels a metre at one metre; the near cube's front is at 9 m less what it is off.
-        let uncapped = Reach::new(&tree, &[0, 1, 2], &view, SilhouetteTolerance::default());
+        let uncapped =
+            OutlineTolerance::new(&tree, &[0, 1, 2], &view, SilhouetteTolerance::default());
         let near = uncapped.at([200, 100], 9.0) - 2.0;
         assert!((near - 10.0 / 8.9).abs() < 0.01, "{near}");
-        assert_eq!(reach.at([200, 100], 9.0), 2.0 + 1.12);
+        assert_eq!(outline.at([200, 100], 9.0), 2.0 + 1.12);
         // Behind it only the far one counts.
-        let far = reach.at([200, 100], 99.0) - 2.0;
+        let far = outline.at([200, 100], 99.0) - 2.0;
         assert!((far - 10.0 / 98.9).abs() < 0.001, "{far}");
         // Where there is none, nothing is off.
-        assert_eq!(reach.at([200, 10], 9.0), 2.0);
-        assert_eq!(reach.at([10, 100], 9.0), 2.0);
+        assert_eq!(outline.at([200, 10], 9.0), 2.0);
+        assert_eq!(outline.at([10, 100], 9.0), 2.0);
     }
 }

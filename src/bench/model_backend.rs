@@ -1,37 +1,37 @@
-//! A world in which time follows from the cost model and loading from a number of bytes a
+//! A backend in which time follows from the cost model and loading from a number of bytes a
 //! millisecond, so that runs are the same on every machine.
 
 use std::sync::Mutex;
 
 use super::replay::lock;
-use super::{ClockConstants, Drawn, World};
+use super::{Backend, ClockConstants, Drawn};
 use crate::camera::View;
 use crate::runtime::residency::{Changes, Residency};
 use crate::runtime::{SceneTree, covered};
 use crate::{Error, Result};
 
-/// A world in which time follows from the cost model. Nothing is read or drawn.
+/// A backend in which time follows from the cost model. Nothing is read or drawn.
 #[derive(Clone, Debug)]
-pub struct ModelWorld<'a> {
+pub struct ModelBackend<'a> {
     tree: &'a SceneTree,
     constants: ClockConstants,
     /// Bytes that loading had time for and did not read, or the other way round below 0.
     credit: f64,
 }
 
-impl<'a> ModelWorld<'a> {
-    /// A world over a hierarchy.
+impl<'a> ModelBackend<'a> {
+    /// A backend over a hierarchy.
     pub fn new(tree: &'a SceneTree, constants: ClockConstants) -> Self {
         Self { tree, constants, credit: 0.0 }
     }
 }
 
-impl World for ModelWorld<'_> {
+impl Backend for ModelBackend<'_> {
     fn load_roots(&mut self, residency: &Mutex<Residency>, roots: &[u32]) -> Result<()> {
         let mut residency = lock(residency)?;
         for &root in roots {
             let step = residency.load_root(root);
-            if !residency.portion_read(root, step.bytes) {
+            if !residency.chunk_read(root, step.bytes) {
                 return Err(Error::Internal(format!("root {root} is incomplete")));
             }
             residency.loaded(root);
@@ -68,7 +68,7 @@ impl World for ModelWorld<'_> {
                 break;
             };
             self.credit -= step.bytes as f64;
-            if residency.portion_read(step.node, step.bytes) {
+            if residency.chunk_read(step.node, step.bytes) {
                 residency.loaded(step.node);
             }
         }

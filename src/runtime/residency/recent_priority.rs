@@ -6,10 +6,10 @@ const KEPT_FRAMES: u64 = 30;
 /// The highest priority that nodes had lately.
 ///
 /// Where the camera looks to and fro, half of the nodes lose much of their priority with every
-/// turn and have it back with the next. By what they were worth lately, none makes room for
+/// turn and have it back with the next. By what they were worth lately, none is evicted for
 /// another that is not worth more than both.
 #[derive(Clone, Debug)]
-pub(super) struct Worth {
+pub(super) struct RecentPriority {
     /// The span of [`KEPT_FRAMES`] frames at hand.
     span: u64,
     nodes: Vec<Recent>,
@@ -34,7 +34,7 @@ impl Recent {
     }
 }
 
-impl Worth {
+impl RecentPriority {
     pub fn new(nodes: usize) -> Self {
         Self { span: 0, nodes: vec![Recent::default(); nodes] }
     }
@@ -63,19 +63,19 @@ mod tests {
     #[test]
     fn what_a_node_was_worth_is_kept_for_a_while_and_not_for_ever() {
         for first in [0, 1, 17, KEPT_FRAMES - 1, KEPT_FRAMES] {
-            let mut worth = Worth::new(2);
-            worth.update(first, &[(0, 5.0), (1, 1.0)]);
+            let mut recent = RecentPriority::new(2);
+            recent.update(first, &[(0, 5.0), (1, 1.0)]);
             for after in 1..=3 * KEPT_FRAMES {
-                worth.update(first + after, &[(1, 2.0)]);
+                recent.update(first + after, &[(1, 2.0)]);
                 match after {
-                    ..=KEPT_FRAMES => assert_eq!(worth.of(0), 5.0, "{first} {after}"),
-                    _ if after >= 2 * KEPT_FRAMES => assert_eq!(worth.of(0), 0.0),
-                    _ => assert!([0.0, 5.0].contains(&worth.of(0))),
+                    ..=KEPT_FRAMES => assert_eq!(recent.of(0), 5.0, "{first} {after}"),
+                    _ if after >= 2 * KEPT_FRAMES => assert_eq!(recent.of(0), 0.0),
+                    _ => assert!([0.0, 5.0].contains(&recent.of(0))),
                 }
-                assert_eq!(worth.of(1), 2.0);
+                assert_eq!(recent.of(1), 2.0);
             }
-            worth.update(first + 3 * KEPT_FRAMES + 1, &[(0, 1.0)]);
-            assert_eq!(worth.of(0), 1.0);
+            recent.update(first + 3 * KEPT_FRAMES + 1, &[(0, 1.0)]);
+            assert_eq!(recent.of(0), 1.0);
         }
     }
 }

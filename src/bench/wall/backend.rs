@@ -1,4 +1,4 @@
-//! The real world: a loading thread, a graphics adapter, and time as it passes.
+//! The real backend: a loading thread, a graphics adapter, and time as it passes.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::{Snapshots, process};
 use crate::bench::replay::lock;
-use crate::bench::{Drawn, Look, World};
+use crate::bench::{Backend, Drawn, Inspect};
 use crate::camera::View;
 use crate::loading::{Arrival, LoadingThread, NodeFiles};
 use crate::render::Renderer;
@@ -18,8 +18,8 @@ use crate::{Error, Result};
 /// warm as if nobody had: without, the first three are slower, the first by a third.
 const WARM_UP: usize = 4;
 
-/// The real world.
-pub struct WallWorld<'a> {
+/// The real backend.
+pub struct GpuBackend<'a> {
     tree: &'a SceneTree,
     files: NodeFiles,
     renderer: &'a mut Renderer,
@@ -36,8 +36,8 @@ pub struct WallWorld<'a> {
     frame_start: Instant,
 }
 
-impl<'a> WallWorld<'a> {
-    /// A world in which nothing is loaded yet.
+impl<'a> GpuBackend<'a> {
+    /// A backend in which nothing is loaded yet.
     pub fn new(
         tree: &'a SceneTree,
         files: NodeFiles,
@@ -103,12 +103,12 @@ pub(in crate::bench) fn near_plane(tree: &SceneTree) -> f32 {
     ((tree.diagonal() * 1e-4) as f32).clamp(1e-6, 0.1)
 }
 
-impl World for WallWorld<'_> {
+impl Backend for GpuBackend<'_> {
     fn load_roots(&mut self, residency: &Mutex<Residency>, roots: &[u32]) -> Result<()> {
         for &root in roots {
             let mut residency = lock(residency)?;
             let step = residency.load_root(root);
-            residency.portion_read(root, step.bytes);
+            residency.chunk_read(root, step.bytes);
             match self.files.read(root, |texture| residency.has_texture(texture)) {
                 Ok(arrival) => {
                     self.arrived.insert(root, arrival);
@@ -173,13 +173,13 @@ impl World for WallWorld<'_> {
         }
     }
 
-    fn aside(&mut self, front: &[u32], view: &View, look: &mut Look<'_>) -> Result<()> {
-        let still = self.thread.as_ref().map(LoadingThread::still).transpose()?;
-        look(Some(self.renderer.surface()?))?;
+    fn pause_for(&mut self, front: &[u32], view: &View, inspect: &mut Inspect<'_>) -> Result<()> {
+        let guard = self.thread.as_ref().map(LoadingThread::pause).transpose()?;
+        inspect(Some(self.renderer.surface()?))?;
         for _ in 0..WARM_UP {
             self.renderer.draw(front, &view.pose, self.near)?;
         }
-        drop(still);
+        drop(guard);
         Ok(())
     }
 

@@ -1,11 +1,11 @@
-//! What makes room for a node.
+//! What is evicted for a node.
 
 use super::state::{NodeState, Residency};
 
-/// Room that is kept for nodes until they can begin to load, in order of their priority.
+/// Memory reserved for nodes until they can begin to load, in order of their priority.
 #[derive(Debug, Default)]
-pub(super) struct Promises {
-    /// Nodes that could not begin: they wait for room that is being made, or there is none.
+pub(super) struct Reservations {
+    /// Nodes that could not begin: they wait for what is being evicted, or nothing may be.
     pub tried: usize,
     /// Those that wait.
     nodes: Vec<u32>,
@@ -14,43 +14,43 @@ pub(super) struct Promises {
 }
 
 impl Residency {
-    /// True where there is room for a node, beside what `promises` keeps for more important ones.
-    /// Otherwise room is made where what is less important suffices, which is free from the next
-    /// frame on and is promised to the node. Nothing is given up in vain.
-    pub(super) fn make_room(&mut self, node: u32, promises: &mut Promises) -> bool {
-        let missing = self.missing(node, promises);
-        // Room for more than can be taken over in a frame would be empty for a while.
-        let too_much = !promises.nodes.is_empty()
-            && promises.bytes + self.needed_bytes(node) > self.options.upload_bytes;
-        if missing > 0 && (too_much || !self.evict(node, missing, promises)) {
-            promises.tried += 1;
+    /// True where a node fits now, beside what is reserved for more important ones. Otherwise less
+    /// important nodes are evicted, if they suffice: their memory is free from the next frame on and
+    /// reserved for this node.
+    pub(super) fn reserve(&mut self, node: u32, reservations: &mut Reservations) -> bool {
+        let missing = self.missing(node, reservations);
+        // Memory for more than is uploaded in a frame would lie idle.
+        let too_much = !reservations.nodes.is_empty()
+            && reservations.bytes + self.needed_bytes(node) > self.options.upload_bytes;
+        if missing > 0 && (too_much || !self.evict(node, missing, reservations)) {
+            reservations.tried += 1;
             return false;
         }
         let needed = self.needed_bytes(node);
-        if needed <= self.ledger.free() && self.missing(node, promises) == 0 {
+        if needed <= self.budget.free() && self.missing(node, reservations) == 0 {
             return true;
         }
-        promises.tried += 1;
-        promises.bytes += needed;
-        promises.nodes.push(node);
+        reservations.tried += 1;
+        reservations.bytes += needed;
+        reservations.nodes.push(node);
         false
     }
 
     /// Bytes that loading a node takes now.
     fn needed_bytes(&self, node: u32) -> u64 {
-        self.ledger.held(&self.sizes, node) + self.files(node, &self.textures_held)
+        self.budget.held(&self.sizes, node) + self.files(node, &self.textures_held)
     }
 
     /// Bytes that a node and those before it lack even at the next frame.
-    fn missing(&self, node: u32, promises: &Promises) -> u64 {
+    fn missing(&self, node: u32, reservations: &Reservations) -> u64 {
         let leaving: u64 = self.leaving.iter().map(|&node| self.least_freed(node)).sum();
-        let needed = promises.bytes + self.needed_bytes(node);
-        needed.saturating_sub(self.ledger.free() + leaving)
+        let needed = reservations.bytes + self.needed_bytes(node);
+        needed.saturating_sub(self.budget.free() + leaving)
     }
 
     /// Frees `missing` bytes of what is less important than a node; false, and nothing done,
     /// where that does not suffice.
-    fn evict(&mut self, node: u32, mut missing: u64, promises: &Promises) -> bool {
+    fn evict(&mut self, node: u32, mut missing: u64, reservations: &Reservations) -> bool {
         let priority = self.list.priority(node);
         // Loads under way that matter less go first: nothing of them is drawn.
         let mut abandoned = Vec::new();
@@ -70,10 +70,10 @@ impl Residency {
             }
             at = self.list.before(other);
             let leads = |&for_node: &u32| self.leads_to(other, for_node);
-            if self.worth.of(other) * margin < priority
+            if self.recent_priority.of(other) * margin < priority
                 && self.may_leave(other, &victims)
                 && !leads(&node)
-                && !promises.nodes.iter().any(leads)
+                && !reservations.nodes.iter().any(leads)
             {
                 missing = missing.saturating_sub(self.least_freed(other));
                 victims.push(other);
@@ -124,7 +124,7 @@ impl Residency {
 
     /// Whether selection would no longer come to `node` if `other` left: `other` is an ancestor,
     /// or one of those that are drawn together with an ancestor or not at all. It would come back
-    /// as soon as `node` is no longer asked for, and make room again for it, and so on.
+    /// as soon as `node` is no longer asked for, and evict again for it, and so on.
     fn leads_to(&self, other: u32, node: u32) -> bool {
         let above = self.parents[other as usize];
         let needed = self.needed[other as usize] == self.frame;

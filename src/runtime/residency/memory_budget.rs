@@ -4,7 +4,7 @@ use super::Sizes;
 
 /// Every byte that is held or being loaded, against a cap.
 #[derive(Clone, Debug)]
-pub(super) struct Ledger {
+pub(super) struct MemoryBudget {
     cap: u64,
     used: u64,
     peak: u64,
@@ -12,7 +12,7 @@ pub(super) struct Ledger {
     users: Vec<u32>,
 }
 
-impl Ledger {
+impl MemoryBudget {
     pub fn new(cap: u64, textures: usize) -> Self {
         Self { cap, used: 0, peak: 0, users: vec![0; textures] }
     }
@@ -36,7 +36,7 @@ impl Ledger {
         size.held_bytes + unused.map(|&t| sizes.textures[t as usize].held_bytes).sum::<u64>()
     }
 
-    /// Reserves bytes for a node and for what is read of its files; the caller has made room.
+    /// Reserves bytes for a node and for what is read of its files; the caller has seen that they are free.
     pub fn reserve(&mut self, sizes: &Sizes, node: u32, read_bytes: u64) {
         self.used += self.held(sizes, node) + read_bytes;
         debug_assert!(self.used <= self.cap, "{} of {} bytes", self.used, self.cap);

@@ -20,7 +20,7 @@ const READ_AT_ONCE: usize = 64;
 
 /// Draws any nodes of a scene with a renderer of its own, which holds so many bytes and no more:
 /// where that is too little for a picture, it is drawn part by part.
-pub struct Painter {
+pub struct ReferenceRenderer {
     tree: SceneTree,
     files: NodeFiles,
     sizes: Sizes,
@@ -37,7 +37,7 @@ pub struct Painter {
     broken: BTreeMap<u32, String>,
 }
 
-impl Painter {
+impl ReferenceRenderer {
     /// One that holds at most `cap_bytes`, or the bytes of one node where that is more.
     pub fn new(session: &Session, options: &RenderOptions, cap_bytes: u64) -> Result<Self> {
         let options = RenderOptions { keep_depths: true, ..options.clone() };
@@ -79,8 +79,8 @@ impl Painter {
 
     /// Draws nodes; those whose files cannot be used are left out. Alpha of the picture is 0 where
     /// nothing was drawn.
-    pub fn paint(&mut self, nodes: &[u32], pose: &Pose) -> Result<RgbaImage> {
-        // What is there comes first, before any of it has to make room.
+    pub fn render(&mut self, nodes: &[u32], pose: &Pose) -> Result<RgbaImage> {
+        // What is there comes first, before any of it is evicted.
         let (there, missing): (Vec<u32>, Vec<u32>) =
             nodes.iter().partition(|node| self.held.contains_key(node));
         self.renderer.draw(&[], pose, self.near)?;
@@ -130,7 +130,7 @@ impl Painter {
             .into_iter()
             .filter(|node| !self.held.contains_key(node) && !self.broken.contains_key(node))
             .collect();
-        self.make_room(&missing);
+        self.evict_for(&missing);
         for nodes in missing.chunks(READ_AT_ONCE) {
             self.load(nodes)?;
         }
@@ -141,9 +141,8 @@ impl Painter {
         Ok(())
     }
 
-    /// Lets go of what was drawn longest ago, until there is room for nodes, and never of what
-    /// the present part draws.
-    fn make_room(&mut self, missing: &[u32]) {
+    /// Evicts what was drawn longest ago until `missing` fit, but nothing that the present part draws.
+    fn evict_for(&mut self, missing: &[u32]) {
         let mut textures: BTreeSet<u32> = self.textures.keys().copied().collect();
         let mut more = 0;
         for &node in missing {

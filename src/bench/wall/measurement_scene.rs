@@ -10,7 +10,7 @@ use crate::render::content::DrawPicture;
 use crate::runtime::SceneTree;
 
 /// Puts on the graphics card what is to be drawn next, and takes down all of it at the end.
-pub struct Stage<'a> {
+pub struct MeasurementScene<'a> {
     tree: &'a SceneTree,
     files: NodeFiles,
     renderer: &'a mut Renderer,
@@ -24,7 +24,7 @@ pub struct Stage<'a> {
     read_ms: f64,
 }
 
-impl<'a> Stage<'a> {
+impl<'a> MeasurementScene<'a> {
     /// An empty one.
     pub fn new(tree: &'a SceneTree, files: NodeFiles, renderer: &'a mut Renderer) -> Self {
         let textures = vec![false; files.scene().shared_textures.len()];
@@ -107,7 +107,7 @@ impl<'a> Stage<'a> {
     }
 }
 
-impl Drop for Stage<'_> {
+impl Drop for MeasurementScene<'_> {
     fn drop(&mut self) {
         self.nodes.iter().chain(&self.stripped).for_each(|&node| self.renderer.remove(node));
         (0..self.textures.len() as u32).for_each(|texture| self.renderer.remove_shared(texture));
