@@ -22,10 +22,7 @@ mod write;
 
 pub use accuracy::{Accuracy, FrameInspector, FrameSample, ReferenceContext, WorstFrame};
 pub use clock::{CLOCK_FILE_VERSION, ClockConstants};
-pub use compare::{
-    Bytes, Comparison, Count, Dimension, Flip, Limit, Limits, Milliseconds, Points, Row,
-    SummaryFile, Unit, compare,
-};
+pub use compare::{Comparison, Limit, Limits, Row, SummaryFile, Unit, compare};
 pub use model_backend::ModelBackend;
 pub use options::{BenchOptions, Pace, Size};
 pub use record::FrameRecord;

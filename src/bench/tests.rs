@@ -233,8 +233,7 @@ fn a_run_is_written_whole_and_compares_with_itself_and_not_with_another_target()
     };
     let mut other = options(1 << 20);
     let [first, second] = ["first", "second"].map(|name| write(name, other));
-    let none = "0".parse().unwrap();
-    let limits = Limits { max_toggle_increase: Some(none), ..Limits::default() };
+    let limits = Limits { max: vec!["toggles=+0".parse().unwrap()] };
     let comparison = compare(&first, &second, &limits, false).unwrap();
     assert!(!comparison.exceeded() && comparison.differences.is_empty());
     other.selection.target_ms = 2.0;

@@ -1,26 +1,10 @@
 //! The figures that are compared.
 
-use super::limit::Limit;
-use super::options::Limits;
-
-/// How a figure is shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Unit {
-    /// A number of things.
-    Count,
-    /// Milliseconds.
-    Ms,
-    /// Bytes; MiB in a table.
-    Bytes,
-    /// Percent.
-    Percent,
-    /// A difference of pictures, 0 to 1.
-    Flip,
-}
+use super::Unit;
 
 /// One figure of a summary.
 pub(super) struct Metric {
+    /// In tables, in JSON and on the command line.
     pub name: &'static str,
     pub unit: Unit,
     /// Where it stands, as JSON pointers; the sum of all.
@@ -31,93 +15,63 @@ pub(super) struct Metric {
     pub optional: bool,
     /// Only how large it is matters, not in which direction.
     pub magnitude: bool,
-    /// Its limit: how it reads and whether it is exceeded.
-    pub judge: fn(&Limits, f64, f64) -> Option<Verdict>,
 }
 
-/// A limit as it was given and whether it is exceeded.
-pub(super) struct Verdict {
-    pub limit: String,
-    pub exceeded: bool,
+const fn metric(name: &'static str, unit: Unit, keys: &'static [&'static str]) -> Metric {
+    Metric { name, unit, keys, scale: 1.0, optional: false, magnitude: false }
 }
 
-fn verdict<D>(limit: &Option<Limit<D>>, base: f64, new: f64) -> Option<Verdict> {
-    let limit = limit.as_ref()?;
-    Some(Verdict { limit: limit.to_string(), exceeded: limit.is_exceeded(base, new) })
+/// A share, 0 to 1 in the summary.
+const fn share(name: &'static str, keys: &'static [&'static str]) -> Metric {
+    Metric { scale: 100.0, ..metric(name, Unit::Percent, keys) }
 }
 
-/// A figure with the name of its limit, or without one.
-macro_rules! metric {
-    ($name:literal, $unit:ident, [$($key:literal),+], $limit:ident) => {
-        Metric {
-            name: $name,
-            unit: Unit::$unit,
-            keys: &[$($key),+],
-            scale: 1.0,
-            optional: false,
-            magnitude: false,
-            judge: |limits, base, new| verdict(&limits.$limit, base, new),
-        }
-    };
-    ($name:literal, $unit:ident, [$($key:literal),+]) => {
-        Metric {
-            name: $name,
-            unit: Unit::$unit,
-            keys: &[$($key),+],
-            scale: 1.0,
-            optional: false,
-            magnitude: false,
-            judge: |_, _, _| None,
-        }
-    };
+const fn of_images(name: &'static str, unit: Unit, keys: &'static [&'static str]) -> Metric {
+    Metric { optional: true, ..metric(name, unit, keys) }
 }
 
-/// In the order of the table. Those without a limit are there to explain the others.
-#[rustfmt::skip]
+/// In the order of the table.
 pub(super) const METRICS: &[Metric] = &[
-    metric!("toggles", Count, ["/toggles/up", "/toggles/down"], max_toggle_increase),
-    metric!("toggles up", Count, ["/toggles/up"]),
-    metric!("toggles down", Count, ["/toggles/down"]),
-    metric!("longest toggle run", Count, ["/toggles/longest_run"], max_toggle_run_increase),
-    metric!("frame time mean", Ms, ["/frame_ms/mean"], max_mean_increase),
-    metric!("frame time p50", Ms, ["/frame_ms/p50"]),
-    metric!("frame time p95", Ms, ["/frame_ms/p95"], max_p95_increase),
-    metric!("frame time p99", Ms, ["/frame_ms/p99"], max_p99_increase),
-    Metric {
-        scale: 100.0,
-        ..metric!("over target", Percent, ["/over_target_share"], max_over_target_increase)
-    },
-    Metric {
-        scale: 100.0,
-        ..metric!("over target by a tenth", Percent, ["/late_share"], max_late_increase)
-    },
-    Metric { scale: 100.0, ..metric!("utilisation", Percent, ["/utilisation"]) },
+    metric("toggles", Unit::Count, &["/toggles/up", "/toggles/down"]),
+    metric("toggles-up", Unit::Count, &["/toggles/up"]),
+    metric("toggles-down", Unit::Count, &["/toggles/down"]),
+    metric("longest-toggle-run", Unit::Count, &["/toggles/longest_run"]),
+    metric("frame-time-mean", Unit::Ms, &["/frame_ms/mean"]),
+    metric("frame-time-p50", Unit::Ms, &["/frame_ms/p50"]),
+    metric("frame-time-p95", Unit::Ms, &["/frame_ms/p95"]),
+    metric("frame-time-p99", Unit::Ms, &["/frame_ms/p99"]),
+    share("over-target", &["/over_target_share"]),
+    share("late", &["/late_share"]),
+    share("utilisation", &["/utilisation"]),
     Metric {
         magnitude: true,
-        ..metric!("estimate error", Percent, ["/estimate_error_percent/mean"],
-                  max_estimate_error_increase)
+        ..metric("estimate-error", Unit::Percent, &["/estimate_error_percent/mean"])
     },
-    metric!("estimate deviation", Percent, ["/estimate_error_percent/sd"],
-            max_estimate_deviation_increase),
-    metric!("peak memory", Bytes, ["/memory/peak_bytes"], max_memory_increase),
-    metric!("bytes read", Bytes, ["/loading/read_bytes"], max_read_increase),
-    metric!("evictions", Count, ["/loading/evictions"], max_eviction_increase),
-    metric!("selection mean", Ms, ["/select_ms/mean"], max_select_increase),
-    metric!("nodes visited", Count, ["/visited_mean"], max_visited_increase),
-    metric!("nodes drawn", Count, ["/nodes_mean"]),
-    metric!("triangles drawn", Count, ["/triangles_mean"]),
-    Metric {
-        optional: true,
-        ..metric!("FLIP", Flip, ["/accuracy/flip_mean/mean"], max_flip_increase)
-    },
-    Metric { optional: true, ..metric!("FLIP p95", Flip, ["/accuracy/flip_p95/mean"]) },
-    Metric { optional: true, ..metric!("FLIP of toggles", Flip, ["/accuracy/pop_flip/mean"]) },
-    Metric {
-        optional: true,
-        ..metric!("gap pixels", Count, ["/accuracy/gap_pixels/sum"], max_gap_increase)
-    },
-    Metric {
-        optional: true,
-        ..metric!("inner gap pixels", Count, ["/accuracy/inner_gap_pixels/sum"])
-    },
+    metric("estimate-deviation", Unit::Percent, &["/estimate_error_percent/sd"]),
+    metric("peak-memory", Unit::Bytes, &["/memory/peak_bytes"]),
+    metric("bytes-read", Unit::Bytes, &["/loading/read_bytes"]),
+    metric("evictions", Unit::Count, &["/loading/evictions"]),
+    metric("selection", Unit::Ms, &["/select_ms/mean"]),
+    metric("nodes-visited", Unit::Count, &["/visited_mean"]),
+    metric("nodes", Unit::Count, &["/nodes_mean"]),
+    metric("triangles", Unit::Count, &["/triangles_mean"]),
+    of_images("flip", Unit::Flip, &["/accuracy/flip_mean/mean"]),
+    of_images("flip-p95", Unit::Flip, &["/accuracy/flip_p95/mean"]),
+    of_images("flip-of-toggles", Unit::Flip, &["/accuracy/pop_flip/mean"]),
+    of_images("gap-pixels", Unit::Count, &["/accuracy/gap_pixels/sum"]),
+    of_images("inner-gap-pixels", Unit::Count, &["/accuracy/inner_gap_pixels/sum"]),
 ];
+
+/// What each metric is, for help.
+pub(super) fn help() -> String {
+    let names: Vec<&str> = METRICS.iter().map(|metric| metric.name).collect();
+    format!(
+        "The most that a metric may be (`flip=0.03`), or how much more than it was in the base, in \
+         its unit or in percent (`frame-time-p95=+0.5ms`, `toggles=+5%`). What is met exactly holds; \
+         what has no limit is shown and not judged. Several may be given.\n\n\
+         METRIC is one of {}. `late` is the share of frames over the target by more than a tenth, \
+         in percentage points (`late=+2pp`), as are other shares; those of FLIP and of gaps need \
+         --reference-every",
+        names.join(", ")
+    )
+}

@@ -6,17 +6,18 @@ mod options;
 mod summary_file;
 #[cfg(test)]
 mod tests;
+mod unit;
 
 use std::fmt::Write;
 
 use serde_json::{Value, json};
 
 use crate::{Error, Result};
-pub use limit::{Bytes, Count, Dimension, Flip, Limit, Milliseconds, Points};
+pub use limit::Limit;
 use metrics::METRICS;
-pub use metrics::Unit;
 pub use options::Limits;
 pub use summary_file::SummaryFile;
+pub use unit::Unit;
 
 /// What became of the figures from one run to another.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,9 +39,9 @@ pub struct Row {
     pub base: f64,
     /// What it is now; NaN where the run has none.
     pub new: f64,
-    /// How much it may rise, as that was given.
+    /// Its limits as they were given, the ones that are exceeded first.
     pub limit: Option<String>,
-    /// It rose by more.
+    /// It is above one of them.
     pub exceeded: bool,
 }
 
@@ -73,14 +74,16 @@ pub fn compare(
             Ok(if metric.magnitude { value.abs() } else { value })
         };
         let (base, new) = (figure(base)?, figure(new)?);
-        let verdict = (metric.judge)(limits, base, new);
+        let mut limits: Vec<&Limit> = limits.of(metric.name).collect();
+        limits.sort_by_key(|limit| !limit.is_exceeded(base, new));
+        let texts: Vec<String> = limits.iter().map(|limit| limit.to_string()).collect();
         Ok(Row {
             metric: metric.name,
             unit: metric.unit,
             base,
             new,
-            exceeded: verdict.as_ref().is_some_and(|verdict| verdict.exceeded),
-            limit: verdict.map(|verdict| verdict.limit),
+            exceeded: limits.first().is_some_and(|limit| limit.is_exceeded(base, new)),
+            limit: (!texts.is_empty()).then(|| texts.join(", ")),
         })
     });
     let rows: Vec<Row> = rows.collect::<Result<_>>()?;
@@ -105,20 +108,6 @@ impl Row {
         };
         percent.is_finite().then_some(percent)
     }
-
-    /// A value of this figure as text, with a sign where it is a change.
-    fn text(&self, value: f64, signed: bool) -> String {
-        let (value, digits, unit) = match self.unit {
-            _ if !value.is_finite() => return "-".into(),
-            Unit::Count if value.fract() == 0.0 => (value, 0, ""),
-            Unit::Count => (value, 1, ""),
-            Unit::Ms => (value, 3, " ms"),
-            Unit::Bytes => (value / f64::from(1 << 20), 2, " MiB"),
-            Unit::Percent => (value, 2, " %"),
-            Unit::Flip => (value, 5, ""),
-        };
-        if signed { format!("{value:+.digits$}{unit}") } else { format!("{value:.digits$}{unit}") }
-    }
 }
 
 impl Comparison {
@@ -140,9 +129,9 @@ impl Comparison {
                 };
                 [
                     row.metric.into(),
-                    row.text(row.base, false),
-                    row.text(row.new, false),
-                    row.text(row.change(), true),
+                    row.unit.text(row.base, false),
+                    row.unit.text(row.new, false),
+                    row.unit.text(row.change(), true),
                     percent.map_or_else(|| "-".into(), |percent| format!("{percent:+.1} %")),
                     limit,
                 ]

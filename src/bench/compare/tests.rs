@@ -65,22 +65,9 @@ fn exceeded(new: &SummaryFile, arguments: &[&str]) -> Vec<&'static str> {
 #[test]
 fn the_same_run_exceeds_nothing_even_where_nothing_may_rise() {
     let same = file("new.json", summary());
-    let all = [
-        "--max-toggle-increase=0",
-        "--max-toggle-run-increase=0%",
-        "--max-mean-increase=0",
-        "--max-p95-increase=0ms",
-        "--max-p99-increase=0",
-        "--max-over-target-increase=0",
-        "--max-late-increase=0",
-        "--max-estimate-error-increase=0",
-        "--max-estimate-deviation-increase=0",
-        "--max-memory-increase=0",
-        "--max-read-increase=0",
-        "--max-eviction-increase=0%",
-        "--max-select-increase=0",
-        "--max-visited-increase=0",
-    ];
+    let of_all = METRICS.iter().filter(|metric| !metric.optional);
+    let all: Vec<String> = of_all.map(|metric| format!("--max={}=+0", metric.name)).collect();
+    let all: Vec<&str> = all.iter().map(String::as_str).collect();
     let comparison = check(&same, &all);
     assert!(!comparison.exceeded());
     assert_eq!(comparison.rows.iter().filter(|row| row.limit.is_some()).count(), all.len());
@@ -90,68 +77,31 @@ fn the_same_run_exceeds_nothing_even_where_nothing_may_rise() {
 #[test]
 fn each_limit_judges_its_own_figure_and_holds_up_to_itself() {
     let cases = [
-        ("--max-toggle-increase=2", "/toggles/down", json!(6), json!(7), "toggles"),
-        ("--max-toggle-increase=20%", "/toggles/up", json!(8), json!(9), "toggles"),
-        (
-            "--max-toggle-run-increase=1",
-            "/toggles/longest_run",
-            json!(3),
-            json!(4),
-            "longest toggle run",
-        ),
-        ("--max-mean-increase=5%", "/frame_ms/mean", json!(21.0), json!(21.1), "frame time mean"),
-        ("--max-p95-increase=0.5ms", "/frame_ms/p95", json!(30.5), json!(30.6), "frame time p95"),
-        ("--max-p99-increase=1ms", "/frame_ms/p99", json!(34.0), json!(34.1), "frame time p99"),
-        (
-            "--max-over-target-increase=2pp",
-            "/over_target_share",
-            json!(0.07),
-            json!(0.08),
-            "over target",
-        ),
-        (
-            "--max-late-increase=100%",
-            "/late_share",
-            json!(0.02),
-            json!(0.03),
-            "over target by a tenth",
-        ),
+        ("toggles=+2", "/toggles/down", json!(6), json!(7)),
+        ("toggles=+20%", "/toggles/up", json!(8), json!(9)),
+        ("toggles=12", "/toggles/up", json!(8), json!(9)),
+        ("longest-toggle-run=+1", "/toggles/longest_run", json!(3), json!(4)),
+        ("frame-time-mean=+5%", "/frame_ms/mean", json!(21.0), json!(21.1)),
+        ("frame-time-p95=+0.5ms", "/frame_ms/p95", json!(30.5), json!(30.6)),
+        ("frame-time-p95=33ms", "/frame_ms/p95", json!(33.0), json!(33.1)),
+        ("frame-time-p99=+1ms", "/frame_ms/p99", json!(34.0), json!(34.1)),
+        ("over-target=+2pp", "/over_target_share", json!(0.07), json!(0.08)),
+        ("late=+100%", "/late_share", json!(0.02), json!(0.03)),
+        ("late=2%", "/late_share", json!(0.02), json!(0.03)),
         // In either direction.
-        (
-            "--max-estimate-error-increase=0.5pp",
-            "/estimate_error_percent/mean",
-            json!(2.5),
-            json!(2.6),
-            "estimate error",
-        ),
-        (
-            "--max-estimate-deviation-increase=10%",
-            "/estimate_error_percent/sd",
-            json!(3.3),
-            json!(3.4),
-            "estimate deviation",
-        ),
-        (
-            "--max-memory-increase=10MiB",
-            "/memory/peak_bytes",
-            json!(110 << 20),
-            json!((110 << 20) + 1),
-            "peak memory",
-        ),
-        ("--max-read-increase=1kB", "/loading/read_bytes", json!(6000), json!(6001), "bytes read"),
-        ("--max-eviction-increase=5%", "/loading/evictions", json!(0), json!(1), "evictions"),
-        (
-            "--max-select-increase=20us",
-            "/select_ms/mean",
-            json!(0.12),
-            json!(0.121),
-            "selection mean",
-        ),
-        ("--max-visited-increase=1", "/visited_mean", json!(51.5), json!(51.6), "nodes visited"),
+        ("estimate-error=+0.5pp", "/estimate_error_percent/mean", json!(2.5), json!(2.6)),
+        ("estimate-deviation=+10%", "/estimate_error_percent/sd", json!(3.3), json!(3.4)),
+        ("peak-memory=+10MiB", "/memory/peak_bytes", json!(110 << 20), json!((110 << 20) + 1)),
+        ("bytes-read=+1kB", "/loading/read_bytes", json!(6000), json!(6001)),
+        ("evictions=+5%", "/loading/evictions", json!(0), json!(1)),
+        ("selection=+20us", "/select_ms/mean", json!(0.12), json!(0.121)),
+        ("nodes-visited=+1", "/visited_mean", json!(51.5), json!(51.6)),
     ];
-    for (limit, key, at_the_limit, above, metric) in cases {
-        assert!(exceeded(&with(key, at_the_limit), &[limit]).is_empty(), "{limit}");
-        assert_eq!(exceeded(&with(key, above.clone()), &[limit]), [metric], "{limit}");
+    for (limit, key, at_the_limit, above) in cases {
+        let (metric, _) = limit.split_once('=').unwrap();
+        let limit = ["--max", limit];
+        assert!(exceeded(&with(key, at_the_limit), &limit).is_empty(), "{limit:?}");
+        assert_eq!(exceeded(&with(key, above.clone()), &limit), [metric], "{limit:?}");
         assert!(exceeded(&with(key, above), &[]).is_empty(), "{key} without a limit");
     }
 }
@@ -262,23 +212,23 @@ fn files_that_are_no_summary_are_refused() {
 fn a_figure_that_is_no_number_exceeds_its_limit_and_is_shown_as_missing() {
     let new = with("/frame_ms/p95", Value::Null);
     assert!(exceeded(&new, &[]).is_empty());
-    assert_eq!(exceeded(&new, &["--max-p95-increase=50%"]), ["frame time p95"]);
+    assert_eq!(exceeded(&new, &["--max=frame-time-p95=+50%"]), ["frame-time-p95"]);
     let comparison = check(&new, &[]);
     assert!(!comparison.text().contains("NaN"), "{}", comparison.text());
     let row = &comparison.to_json()["metrics"][6];
-    assert_eq!((&row["metric"], &row["new"]), (&json!("frame time p95"), &Value::Null));
+    assert_eq!((&row["metric"], &row["new"]), (&json!("frame-time-p95"), &Value::Null));
     assert_eq!(row["change_percent"], Value::Null);
 }
 
 #[test]
 fn the_table_shows_change_limit_and_verdict() {
     let new = with("/toggles/up", json!(9));
-    let comparison = check(&new, &["--max-toggle-increase", "20%", "--max-memory-increase=1MiB"]);
+    let comparison = check(&new, &["--max", "toggles=+20%", "--max", "peak-memory=+1MiB"]);
     let text = comparison.text();
     let line = |name: &str| text.lines().find(|line| line.starts_with(name)).unwrap();
     let words: Vec<&str> = line("toggles ").split_whitespace().collect();
     assert_eq!(words, ["toggles", "10", "13", "+3", "+30.0", "%", "+20%", "EXCEEDED"]);
-    assert!(line("peak memory").ends_with("+0.0 %  +1MiB"), "{text}");
+    assert!(line("peak-memory").ends_with("+0.0 %  +1MiB"), "{text}");
     // From nothing to something is no percentage.
     let evictions = check(&with("/loading/evictions", json!(4)), &[]);
     assert!(
@@ -300,11 +250,20 @@ fn a_limit_that_is_none_is_a_mistake_in_the_arguments() {
         #[command(flatten)]
         limits: Limits,
     }
-    for argument in ["--max-p95-increase=3", "--max-toggle-increase=3ms", "--max-memory-increase=x"]
-    {
-        let error = Command::try_parse_from(["compare", argument]).unwrap_err().to_string();
-        assert!(error.contains("expected how much it may rise"), "{error}");
+    for argument in ["frame-time-p95=3", "toggles=3ms", "peak-memory=x", "late=+x"] {
+        let error = Command::try_parse_from(["compare", "--max", argument]).unwrap_err();
+        let error = error.to_string();
+        assert!(error.contains("expected the most that it may be"), "{error}");
     }
+}
+
+#[test]
+fn of_several_limits_of_one_figure_each_counts() {
+    let new = with("/frame_ms/p95", json!(32.0));
+    let both = ["--max=frame-time-p95=33ms", "--max=frame-time-p95=+1ms"];
+    let row = check(&new, &both).rows.into_iter().find(|row| row.exceeded).unwrap();
+    assert_eq!(row.limit.as_deref(), Some("+1ms, 33ms"));
+    assert_eq!(exceeded(&new, &both[..1]), [""; 0]);
 }
 
 /// A run that was compared with the leaves.
@@ -331,19 +290,19 @@ fn accuracy_is_judged_where_there_is_any_and_missed_where_it_is_asked_for() {
     };
     let (base, same) = (with_pictures(10, 0.02, 5), with_pictures(10, 0.02, 5));
     let worse = with_pictures(10, 0.0211, 6);
-    let all = ["--max-flip-increase=5%", "--max-gap-increase=0"];
+    let all = ["--max=flip=+5%", "--max=gap-pixels=+0"];
     assert!(check(&base, &same, &all).is_empty());
-    assert_eq!(check(&base, &worse, &all), ["FLIP", "gap pixels"]);
-    assert!(check(&base, &worse, &["--max-flip-increase=0.0011"]).is_empty());
-    assert_eq!(check(&base, &worse, &["--max-flip-increase=0.001"]), ["FLIP"]);
+    assert_eq!(check(&base, &worse, &all), ["flip", "gap-pixels"]);
+    assert!(check(&base, &worse, &["--max=flip=+0.0011"]).is_empty());
+    assert_eq!(check(&base, &worse, &["--max=flip=+0.001"]), ["flip"]);
     // A run without, against one with, and two without.
     let without = file("base.json", summary());
-    assert_eq!(check(&without, &same, &all), ["FLIP", "gap pixels"]);
-    assert_eq!(check(&without, &without, &["--max-flip-increase=1"]), ["FLIP"]);
+    assert_eq!(check(&without, &same, &all), ["flip", "gap-pixels"]);
+    assert_eq!(check(&without, &without, &["--max=flip=+1"]), ["flip"]);
     let plain = compare(&without, &without, &Limits::default(), false).unwrap();
     assert!(plain.rows.iter().all(|row| row.unit != Unit::Flip));
     let text = compare(&base, &worse, &Limits::default(), false).unwrap().text();
-    assert!(text.contains("0.02110") && !text.contains("FLIP of toggles"), "{text}");
+    assert!(text.contains("0.02110") && !text.contains("flip-of-toggles"), "{text}");
     let other = with_pictures(20, 0.02, 5);
     let refused = compare(&base, &other, &Limits::default(), false).unwrap_err().to_string();
     assert!(refused.contains("accuracy.every: 10 against 20"), "{refused}");
