@@ -12,6 +12,7 @@ pub mod city;
 pub mod color;
 pub mod cpu_time;
 pub mod decode;
+pub mod engine;
 pub mod error;
 pub mod format;
 pub mod import;

@@ -28,7 +28,7 @@ pub use options::{BenchOptions, Pace, Size};
 pub use record::FrameRecord;
 #[cfg(feature = "render")]
 pub use reference::{Reference, ReferenceRenderer, SilhouetteTolerance};
-pub use replay::{Backend, Drawn, Inspect, Replay, Run, run};
+pub use replay::{Replay, Run, run};
 pub use report::report_html;
 pub use session::Session;
 pub use summary::{Context, SUMMARY_VERSION, summary, summary_text};

@@ -3,9 +3,10 @@
 
 use std::sync::Mutex;
 
-use super::replay::lock;
-use super::{Backend, ClockConstants, Drawn};
+use super::ClockConstants;
 use crate::camera::View;
+use crate::engine::lock;
+use crate::engine::{Backend, Drawn};
 use crate::runtime::residency::{Changes, Residency};
 use crate::runtime::{SceneTree, covered};
 use crate::{Error, Result};
@@ -47,7 +48,7 @@ impl Backend for ModelBackend<'_> {
         0.0
     }
 
-    fn draw(&mut self, _: u64, front: &[u32], view: &View) -> Result<Drawn> {
+    fn draw(&mut self, front: &[u32], view: &View) -> Result<Drawn> {
         let cost: f64 = front.iter().map(|&node| self.tree.node(node).cost).sum();
         let ClockConstants { fixed_ms, ms_per_cost, fill_cost, ms_per_node, .. } = self.constants;
         let load = cost + fill_cost * covered(self.tree, front, view);

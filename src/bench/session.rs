@@ -102,7 +102,6 @@ impl Session {
                 None => None,
             },
             options,
-            levels: self.scene.level_count(),
         };
         Ok((run(replay, progress)?, context))
     }
@@ -164,7 +163,6 @@ impl Session {
                 None => None,
             },
             options,
-            levels: self.scene.level_count(),
         };
         let run = run(replay, progress)?;
         context.broken = backend.broken().to_vec();

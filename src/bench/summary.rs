@@ -49,7 +49,7 @@ pub fn summary(run: &Run, context: &Context) -> Value {
     let frames = &run.frames;
     let target = context.options.selection.target_ms;
     let of = |field: fn(&FrameRecord) -> f64| frames.iter().map(field).collect::<Vec<f64>>();
-    let times = of(|frame| frame.frame_ms);
+    let times = of(|frame| frame.report.frame_ms);
     let share = |holds: &dyn Fn(&f64) -> bool| {
         mean(times.iter().map(|time| f64::from(u8::from(holds(time)))))
     };
@@ -57,7 +57,8 @@ pub fn summary(run: &Run, context: &Context) -> Value {
         times.iter().filter(|&&time| time > target).map(|time| time - target).collect();
     let toggles = |frames: &[FrameRecord]| {
         let sum = |of: fn(&FrameRecord) -> u32| frames.iter().map(of).map(u64::from).sum::<u64>();
-        let (up, down) = (sum(|frame| frame.toggles_up), sum(|frame| frame.toggles_down));
+        let (up, down) =
+            (sum(|frame| frame.report.toggles_up), sum(|frame| frame.report.toggles_down));
         let per_frame = (up + down) as f64 / (frames.len().max(1)) as f64;
         (up, down, per_frame)
     };
@@ -67,8 +68,8 @@ pub fn summary(run: &Run, context: &Context) -> Value {
     let bytes = |of: fn(&FrameRecord) -> u64| frames.iter().map(of).sum::<u64>();
     let levels = |level: usize| {
         json!({
-            "nodes": mean(frames.iter().map(|frame| f64::from(frame.nodes_by_level[level]))),
-            "triangles": mean(frames.iter().map(|frame| frame.triangles_by_level[level] as f64)),
+            "nodes": mean(frames.iter().map(|frame| f64::from(frame.report.nodes_by_level[level]))),
+            "triangles": mean(frames.iter().map(|frame| frame.report.triangles_by_level[level] as f64)),
         })
     };
     json!({
@@ -94,11 +95,11 @@ pub fn summary(run: &Run, context: &Context) -> Value {
         "over_target_share": share(&|&time| time > target),
         "late_share": share(&|&time| time > target * (1.0 + LATE)),
         "over_target_ms": { "mean": mean(over.iter().copied()), "max": percentile(&over, 100.0) },
-        "utilisation": mean(of(|frame| frame.actual_ms)) / target,
-        "estimate_error_percent": error(frames, |frame| frame.estimated_ms),
+        "utilisation": mean(of(|frame| frame.report.actual_ms)) / target,
+        "estimate_error_percent": error(frames, |frame| frame.report.estimated_ms),
         "without_feedback": {
             "estimate_error_percent":
-                error(frames, |frame| frame.estimated_without_feedback_ms),
+                error(frames, |frame| frame.report.estimated_without_feedback_ms),
         },
         "toggles": {
             "up": up,
@@ -114,24 +115,24 @@ pub fn summary(run: &Run, context: &Context) -> Value {
             "start_bytes": run.start_bytes,
             "peak_bytes": run.peak_bytes,
             "peak_share": run.peak_bytes as f64 / cap as f64,
-            "mean_bytes": mean(of(|frame| frame.memory_bytes as f64)),
+            "mean_bytes": mean(of(|frame| frame.report.memory_bytes as f64)),
             "process_peak_bytes": frames.iter().map(|frame| frame.process_bytes).max(),
         },
         "loading": {
-            "read_bytes": bytes(|frame| frame.read_bytes),
-            "arrived": bytes(|frame| u64::from(frame.arrived)),
-            "evictions": bytes(|frame| frame.evictions),
-            "waiting_mean": mean(of(|frame| f64::from(frame.waiting))),
-            "waiting_last": frames.last().map(|frame| frame.waiting),
+            "read_bytes": bytes(|frame| frame.report.read_bytes),
+            "arrived": bytes(|frame| u64::from(frame.report.arrived)),
+            "evictions": bytes(|frame| frame.report.evictions),
+            "waiting_mean": mean(of(|frame| f64::from(frame.report.waiting))),
+            "waiting_last": frames.last().map(|frame| frame.report.waiting),
         },
         "accuracy": context.reference.as_ref().map(|reference| accuracy(frames, reference)),
         "select_ms": {
-            "mean": mean(of(|frame| frame.select_ms)),
-            "max": percentile(&of(|frame| frame.select_ms), 100.0),
+            "mean": mean(of(|frame| frame.report.select_ms)),
+            "max": percentile(&of(|frame| frame.report.select_ms), 100.0),
         },
-        "visited_mean": mean(of(|frame| f64::from(frame.visited))),
-        "nodes_mean": mean(of(|frame| f64::from(frame.nodes))),
-        "triangles_mean": mean(of(|frame| frame.triangles as f64)),
+        "visited_mean": mean(of(|frame| f64::from(frame.report.visited))),
+        "nodes_mean": mean(of(|frame| f64::from(frame.report.nodes))),
+        "triangles_mean": mean(of(|frame| frame.report.triangles as f64)),
         "levels": (0..context.levels).map(levels).collect::<Vec<_>>(),
     })
 }
@@ -187,8 +188,10 @@ pub(super) fn error_percent(actual_ms: f64, estimated_ms: f64) -> Option<f64> {
 }
 
 fn error(frames: &[FrameRecord], estimate: fn(&FrameRecord) -> f64) -> Value {
-    let errors: Vec<f64> =
-        frames.iter().filter_map(|frame| error_percent(frame.actual_ms, estimate(frame))).collect();
+    let errors: Vec<f64> = frames
+        .iter()
+        .filter_map(|frame| error_percent(frame.report.actual_ms, estimate(frame)))
+        .collect();
     json!({ "mean": mean(errors.iter().copied()), "sd": deviation(&errors) })
 }
 
@@ -198,12 +201,12 @@ fn frames_per_toggle(frames: usize, toggles: u64) -> Option<f64> {
 
 /// The most frames in a row each of which toggled.
 fn longest_run(frames: &[FrameRecord]) -> usize {
-    longest(frames, |frame| frame.toggles() > 0)
+    longest(frames, |frame| frame.report.toggles() > 0)
 }
 
 /// The most frames in a row without any toggle.
 fn longest_pause(frames: &[FrameRecord]) -> usize {
-    longest(frames, |frame| frame.toggles() == 0)
+    longest(frames, |frame| frame.report.toggles() == 0)
 }
 
 fn longest(frames: &[FrameRecord], holds: fn(&FrameRecord) -> bool) -> usize {

@@ -6,10 +6,10 @@ use glam::DVec3;
 
 use super::write::frames_csv;
 use super::*;
-use crate::camera::{CameraPath, PathFrame, Pose, from_angles};
+use crate::camera::{CameraPath, PathFrame, Pose, View, from_angles};
 use crate::format::Scene;
 use crate::mesh::UpAxis;
-use crate::runtime::SceneTree;
+use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection};
 use crate::runtime::lakhia::{Lakhia, TimeModel};
 use crate::runtime::residency::{Residency, ResidencyOptions, Sizes};
 use crate::runtime::test_tree::{Sketch, scene, sketch};
@@ -89,7 +89,6 @@ fn replay_before(
             None => None,
         },
         options,
-        levels: scene.level_count(),
     };
     run(replay, |_| true).unwrap()
 }
@@ -124,17 +123,19 @@ fn the_same_run_gives_the_same_bytes() {
 fn a_walk_starts_with_the_roots_and_gets_finer_as_nodes_arrive() {
     let run = replay(&street(20), &walk(300), options(1 << 20));
     let first = &run.frames[0];
-    assert_eq!(first.nodes_by_level[1..], [0, 0]);
-    assert_eq!(first.resident, 20);
+    assert_eq!(first.report.nodes_by_level[1..], [0, 0]);
+    assert_eq!(first.report.resident, 20);
     assert_eq!(run.start_bytes, 20 * 200);
     let last = run.frames.last().unwrap();
-    assert!(last.nodes_by_level[2] > 0, "{last:?}");
-    assert!(run.frames.iter().map(|frame| frame.toggles_up).sum::<u32>() > 0);
+    assert!(last.report.nodes_by_level[2] > 0, "{last:?}");
+    assert!(run.frames.iter().map(|frame| frame.report.toggles_up).sum::<u32>() > 0);
     // What is drawn is what the levels say, and time follows from cost.
     for frame in &run.frames {
-        assert_eq!(frame.nodes, frame.nodes_by_level.iter().sum::<u32>());
-        assert_eq!(frame.triangles, 10 * u64::from(frame.nodes));
-        assert!((frame.actual_ms - (0.5 + 0.1 * f64::from(frame.nodes))).abs() < 1e-9);
+        assert_eq!(frame.report.nodes, frame.report.nodes_by_level.iter().sum::<u32>());
+        assert_eq!(frame.report.triangles, 10 * u64::from(frame.report.nodes));
+        assert!(
+            (frame.report.actual_ms - (0.5 + 0.1 * f64::from(frame.report.nodes))).abs() < 1e-9
+        );
     }
 }
 
@@ -144,7 +145,7 @@ fn loading_reads_no_faster_than_the_clock_allows() {
     let mut seconds = 0.0;
     let mut bytes = 0;
     for frame in &run.frames {
-        bytes += frame.read_bytes;
+        bytes += frame.report.read_bytes;
         // A chunk that was begun is finished.
         assert!(bytes as f64 <= seconds * 50_000.0 + 50.0 * 34.0 + 1000.0);
         seconds += 1.0 / 30.0;
@@ -159,7 +160,7 @@ fn a_still_camera_settles() {
         .map(|frame| PathFrame { frame, time_s: frame as f64 / 30.0, ..path.frames[0] })
         .collect();
     let run = replay(&street(20), &path, options(1 << 20));
-    let late: u32 = run.frames[10_000..].iter().map(FrameRecord::toggles).sum();
+    let late: u32 = run.frames[10_000..].iter().map(|frame| frame.report.toggles()).sum();
     assert_eq!(late, 0);
 }
 
@@ -168,9 +169,9 @@ fn memory_stays_below_a_cap_of_a_few_nodes_and_is_used() {
     let cap = 20 * 200 + 6 * 200 + 1000;
     let run = replay(&street(20), &walk(600), options(cap));
     assert!(run.peak_bytes <= cap);
-    assert!(run.frames.iter().all(|frame| frame.memory_bytes <= cap));
+    assert!(run.frames.iter().all(|frame| frame.report.memory_bytes <= cap));
     assert!(run.peak_bytes as f64 > 0.9 * cap as f64, "{} of {cap}", run.peak_bytes);
-    assert!(run.frames.iter().map(|frame| frame.evictions).sum::<u64>() > 0);
+    assert!(run.frames.iter().map(|frame| frame.report.evictions).sum::<u64>() > 0);
 }
 
 #[test]
@@ -179,7 +180,7 @@ fn frames_of_settling_are_not_logged() {
     options.warm_up_frames = 100;
     let run = replay(&street(20), &walk(10), options);
     assert_eq!(run.frames.len(), 10);
-    assert!(run.frames[0].nodes_by_level[1..].iter().sum::<u32>() > 0, "settled before");
+    assert!(run.frames[0].report.nodes_by_level[1..].iter().sum::<u32>() > 0, "settled before");
 }
 
 #[test]
@@ -210,7 +211,7 @@ fn a_summary_has_the_promised_keys_and_agrees_with_the_frames() {
         assert!(summary.pointer(key).is_some_and(serde_json::Value::is_number), "{key}");
     }
     assert_eq!(summary["frames"], 300);
-    let up: u32 = run.frames.iter().map(|frame| frame.toggles_up).sum();
+    let up: u32 = run.frames.iter().map(|frame| frame.report.toggles_up).sum();
     assert_eq!(summary["toggles"]["up"], up);
     // The model draws in the time that was estimated.
     assert!(summary["estimate_error_percent"]["mean"].as_f64().unwrap().abs() < 1e-9);
@@ -239,6 +240,60 @@ fn a_run_is_written_whole_and_compares_with_itself_and_not_with_another_target()
     other.selection.target_ms = 2.0;
     let error = compare(&first, &write("third", other), &limits, false).unwrap_err();
     assert!(error.to_string().contains("parameters.selection.target_ms: 3.0 against 2.0"));
+}
+
+/// Draws the roots, and from the third frame on the first child of the first root beside them.
+#[derive(Default)]
+struct Overlapping(u32);
+
+impl Policy for Overlapping {
+    fn name(&self) -> &'static str {
+        "overlapping"
+    }
+
+    fn select(&mut self, tree: &SceneTree, view: &View, residents: &Residents, out: &mut Selection) {
+        out.clear();
+        self.0 += 1;
+        let child = tree.children(tree.roots()[0])[0];
+        let is_visible = |node: u32| view.frustum.outside(tree.node(node).bbox) <= 0.0;
+        out.front.extend(tree.roots().iter().copied().filter(|&root| is_visible(root)));
+        out.priorities.extend(tree.roots().iter().chain([&child]).map(|&node| (node, 1.0)));
+        if self.0 > 50 && residents.contains(child) {
+            out.front.extend([tree.roots()[0], child]);
+            out.front.sort_unstable();
+            out.front.dedup();
+        }
+    }
+
+    fn priority(&self, _: &SceneTree, _: u32, _: &View) -> f64 {
+        0.0
+    }
+
+    fn drawn(&mut self, _: &FrameOutcome) {}
+}
+
+#[test]
+fn a_front_that_is_none_ends_the_run_with_policy_frame_and_rule() {
+    let (scene, path, options) = (street(20), walk(100), options(1 << 20));
+    let tree = SceneTree::new(&scene);
+    let sizes = Sizes::new(&scene, |vertices, _, _| u64::from(vertices) * 20, |_| 0);
+    let residency = Residency::new(&tree, sizes, options.residency).unwrap();
+    let replay = Replay {
+        tree: &tree,
+        path: &path,
+        policy: &mut Overlapping::default(),
+        residency: Arc::new(Mutex::new(residency)),
+        backend: &mut ModelBackend::new(&tree, constants()),
+        inspector: None,
+        options,
+    };
+    let error = run(replay, |_| true).unwrap_err();
+    assert_eq!(error.exit_code(), 1);
+    let message = error.to_string();
+    assert!(
+        message.contains("policy overlapping, frame 50: node 1 is drawn, and so is one above it"),
+        "{message}"
+    );
 }
 
 /// Keeps what it was shown of every third frame.
@@ -272,10 +327,10 @@ fn a_witness_sees_every_front_and_changes_nothing_but_its_own_columns() {
     let mut toggled = 0;
     for (frame, front, before) in &inspector.0 {
         let record = &watched.frames[*frame as usize];
-        assert_eq!(front.len() as u32, record.nodes);
-        assert_eq!(before.is_some(), record.toggles() > 0);
+        assert_eq!(front.len() as u32, record.report.nodes);
+        assert_eq!(before.is_some(), record.report.toggles() > 0);
         if let Some(before) = before {
-            assert_eq!(before.len() as u32, watched.frames[*frame as usize - 1].nodes);
+            assert_eq!(before.len() as u32, watched.frames[*frame as usize - 1].report.nodes);
             assert_ne!(before, front);
             toggled += 1;
         }

@@ -79,6 +79,8 @@ pub struct Selection {
     pub covered: f64,
     /// Of the nodes visited, those outside of the view.
     pub culled: u32,
+    /// None of the nodes visited is evicted, not only those of the front.
+    pub keep_visited: bool,
 }
 
 impl Selection {
@@ -88,7 +90,7 @@ impl Selection {
         self.priorities.clear();
         (self.estimated_ms, self.estimated_without_feedback_ms) = (0.0, 0.0);
         (self.v_time, self.share_ms) = (0.0, 0.0);
-        (self.covered, self.culled) = (0.0, 0);
+        (self.covered, self.culled, self.keep_visited) = (0.0, 0, false);
     }
 
     /// Number of nodes visited.

@@ -46,6 +46,7 @@ pub struct SceneTree {
     /// By index in the scene: place.
     places: Vec<u32>,
     roots: u32,
+    levels: usize,
     bounds: [DVec3; 2],
 }
 
@@ -74,7 +75,8 @@ impl SceneTree {
             });
         }
         let bounds = scene.bounds().unwrap_or_default().map(DVec3::from);
-        Self { nodes, indices, places, roots, bounds }
+        let levels = scene.level_count();
+        Self { nodes, indices, places, roots, levels, bounds }
     }
 
     /// Computes costs anew (eq. 3.1) with another `c_textured` than that of the build: how much
@@ -92,6 +94,11 @@ impl SceneTree {
     /// Number of nodes.
     pub fn len(&self) -> usize {
         self.nodes.len()
+    }
+
+    /// Number of levels.
+    pub fn levels(&self) -> usize {
+        self.levels
     }
 
     /// True without nodes; no scene that was read is.

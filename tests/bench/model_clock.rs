@@ -77,7 +77,6 @@ fn replay(scene: &Scene, frames: usize, target_ms: f64) -> Vec<FrameRecord> {
         backend: &mut backend,
         inspector: None,
         options,
-        levels: scene.level_count(),
     };
     run(replay, |_| true).unwrap().frames
 }
@@ -92,14 +91,21 @@ fn work_does_not_grow_with_what_stands_below_the_front() {
     assert_eq!(shallow.len(), 300);
     for (one, other) in shallow.iter().zip(&deep) {
         // The front stays above where the two differ, and nodes below it are met only once.
-        assert_eq!(one.nodes_by_level[4], 0);
-        assert_eq!(other.nodes_by_level[..5], one.nodes_by_level);
-        assert_eq!((one.visited, one.culled), (other.visited, other.culled));
-        assert_eq!((one.waiting, one.read_bytes), (other.waiting, other.read_bytes));
-        assert_eq!(one.estimated_ms.to_bits(), other.estimated_ms.to_bits());
-        assert!(one.visited <= 12 + 4 * 4 * one.nodes.max(4), "{one:?}");
+        assert_eq!(one.report.nodes_by_level[4], 0);
+        assert_eq!(other.report.nodes_by_level[..5], one.report.nodes_by_level);
+        assert_eq!(
+            (one.report.visited, one.report.culled),
+            (other.report.visited, other.report.culled)
+        );
+        assert_eq!(
+            (one.report.waiting, one.report.read_bytes),
+            (other.report.waiting, other.report.read_bytes)
+        );
+        assert_eq!(one.report.estimated_ms.to_bits(), other.report.estimated_ms.to_bits());
+        assert!(one.report.visited <= 12 + 4 * 4 * one.report.nodes.max(4), "{one:?}");
     }
-    let levels: Vec<u32> =
-        (0..5).map(|level| shallow.iter().map(|frame| frame.nodes_by_level[level]).sum()).collect();
+    let levels: Vec<u32> = (0..5)
+        .map(|level| shallow.iter().map(|frame| frame.report.nodes_by_level[level]).sum())
+        .collect();
     assert!(levels[1] > 0 && levels[2] > 0, "{levels:?}: the front is of some depth");
 }

@@ -72,12 +72,12 @@ impl Figures {
     pub fn add_run(&mut self, run: &Run) {
         let sum = |of: fn(&hlod::bench::FrameRecord) -> f64| run.frames.iter().map(of).sum::<f64>();
         let frames = run.frames.len() as f64;
-        self.add("toggles", sum(|frame| f64::from(frame.toggles())), 100.0);
-        self.add("triangles drawn", sum(|frame| frame.triangles as f64) / frames, 1.0);
-        self.add("nodes drawn", sum(|frame| f64::from(frame.nodes)) / frames, 1.0);
-        self.add("nodes visited", sum(|frame| f64::from(frame.visited)) / frames, 1.0);
-        self.add("frame, ms", sum(|frame| frame.frame_ms) / frames, 1e-3);
-        self.add("expected, ms", sum(|frame| frame.estimated_ms) / frames, 1e-3);
+        self.add("toggles", sum(|frame| f64::from(frame.report.toggles())), 100.0);
+        self.add("triangles drawn", sum(|frame| frame.report.triangles as f64) / frames, 1.0);
+        self.add("nodes drawn", sum(|frame| f64::from(frame.report.nodes)) / frames, 1.0);
+        self.add("nodes visited", sum(|frame| f64::from(frame.report.visited)) / frames, 1.0);
+        self.add("frame, ms", sum(|frame| frame.report.frame_ms) / frames, 1e-3);
+        self.add("expected, ms", sum(|frame| frame.report.estimated_ms) / frames, 1e-3);
     }
 }
 

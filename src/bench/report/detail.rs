@@ -11,10 +11,10 @@ const MOST_LEVELS: usize = 8;
 /// What was drawn of each level, as it is and in percent.
 pub(super) fn figures(frames: &[FrameRecord], levels: usize) -> Vec<Figure> {
     let nodes = stacks(frames, levels, |frame, level| {
-        frame.nodes_by_level.get(level).copied().map_or(0.0, f64::from)
+        frame.report.nodes_by_level.get(level).copied().map_or(0.0, f64::from)
     });
     let triangles = stacks(frames, levels, |frame, level| {
-        frame.triangles_by_level.get(level).map_or(0.0, |&count| count as f64)
+        frame.report.triangles_by_level.get(level).map_or(0.0, |&count| count as f64)
     });
     let figure = |number, title, caption: &str, label: &str, stacks: &[Vec<f64>]| Figure {
         number,
@@ -115,10 +115,11 @@ mod tests {
 
     #[test]
     fn stacks_end_with_the_whole_and_deep_levels_share_one() {
-        let frame = FrameRecord { nodes_by_level: (1..=12).collect(), ..FrameRecord::default() };
+        let mut frame = FrameRecord::default();
+        frame.report.nodes_by_level = (1..=12).collect();
         let frames = [frame, FrameRecord::default()];
         let count = |frame: &FrameRecord, level: usize| {
-            frame.nodes_by_level.get(level).copied().map_or(0.0, f64::from)
+            frame.report.nodes_by_level.get(level).copied().map_or(0.0, f64::from)
         };
         let stacks = stacks(&frames, 12, count);
         assert_eq!(stacks.len(), MOST_LEVELS);

@@ -10,10 +10,12 @@ use crate::bench::summary::error_percent;
 pub(super) fn figures(frames: &[FrameRecord]) -> Vec<Figure> {
     let frame = Places::frames(frames);
     let without = of(frames, |frame| {
-        error_percent(frame.actual_ms, frame.estimated_without_feedback_ms).unwrap_or(f64::NAN)
+        error_percent(frame.report.actual_ms, frame.report.estimated_without_feedback_ms)
+            .unwrap_or(f64::NAN)
     });
-    let with =
-        of(frames, |frame| error_percent(frame.actual_ms, frame.estimated_ms).unwrap_or(f64::NAN));
+    let with = of(frames, |frame| {
+        error_percent(frame.report.actual_ms, frame.report.estimated_ms).unwrap_or(f64::NAN)
+    });
     let finite = |values: &[f64]| -> Vec<f64> {
         values.iter().copied().filter(|value| value.is_finite()).collect()
     };
@@ -44,7 +46,7 @@ pub(super) fn figures(frames: &[FrameRecord]) -> Vec<Figure> {
         moving_average(&known)
     });
     let (y, count) = range(&averages.concat(), &[]);
-    let v_time = of(frames, |frame| frame.v_time * 1e3);
+    let v_time = of(frames, |frame| frame.report.v_time * 1e3);
     let (low, high) =
         v_time.iter().fold((f64::INFINITY, 0f64), |(low, high), &v| (low.min(v), high.max(v)));
     vec![

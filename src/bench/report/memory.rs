@@ -8,7 +8,7 @@ use crate::bench::{Context, Run};
 pub(super) fn figures(run: &Run, context: &Context) -> Vec<Figure> {
     let frames = &run.frames;
     let (frame, seconds) = (Places::frames(frames), Places::seconds(frames));
-    let used = of(frames, |frame| frame.memory_bytes as f64);
+    let used = of(frames, |frame| frame.report.memory_bytes as f64);
     let cap = context.options.residency.max_memory_bytes as f64;
     let most = used.iter().fold(run.peak_bytes as f64, |most, &bytes| most.max(bytes));
     // A cap that is far above would leave nothing to see.
@@ -37,12 +37,12 @@ pub(super) fn figures(run: &Run, context: &Context) -> Vec<Figure> {
         },
     };
 
-    let read = of(frames, |frame| frame.read_bytes as f64);
+    let read = of(frames, |frame| frame.report.read_bytes as f64);
     let (unit, name) = byte_unit(read.iter().copied().fold(0.0, f64::max));
     let read: Vec<f64> = read.iter().map(|bytes| bytes / unit).collect();
-    let waiting = of(frames, |frame| f64::from(frame.waiting));
-    let arrived = of(frames, |frame| f64::from(frame.arrived));
-    let evicted = of(frames, |frame| -(frame.evictions as f64));
+    let waiting = of(frames, |frame| f64::from(frame.report.waiting));
+    let arrived = of(frames, |frame| f64::from(frame.report.arrived));
+    let evicted = of(frames, |frame| -(frame.report.evictions as f64));
     vec![
         memory,
         Figure {

@@ -6,6 +6,7 @@ use super::*;
 use crate::bench::{
     Accuracy, BenchOptions, ClockConstants, FrameRecord, ReferenceContext, WorstFrame, summary,
 };
+use crate::engine::FrameReport;
 use crate::random::Random;
 
 /// A run of made-up frames that has a little of everything.
@@ -20,22 +21,25 @@ fn frames(count: usize, levels: usize) -> Run {
         FrameRecord {
             frame: index as u64,
             time_s: index as f64 / 30.0,
-            estimated_ms: ms * (0.95 + 0.1 * noise()),
-            estimated_without_feedback_ms: ms * (0.8 + 0.4 * noise()),
-            actual_ms: ms,
-            frame_ms: ms + noise(),
-            v_time: 0.0025 + 0.0002 * noise(),
-            toggles_up: u32::from(noise() < 0.1) * 3,
-            toggles_down: u32::from(noise() < 0.1),
-            nodes: nodes_by_level.iter().sum(),
-            triangles: triangles_by_level.iter().sum(),
-            memory_bytes: (noise() * 1e9) as u64,
-            read_bytes: (noise() * 1e6) as u64,
-            arrived: (noise() * 10.0) as u32,
-            waiting: (noise() * 500.0) as u32,
-            evictions: (noise() * 10.0) as u64,
-            nodes_by_level,
-            triangles_by_level,
+            report: FrameReport {
+                estimated_ms: ms * (0.95 + 0.1 * noise()),
+                estimated_without_feedback_ms: ms * (0.8 + 0.4 * noise()),
+                actual_ms: ms,
+                frame_ms: ms + noise(),
+                v_time: 0.0025 + 0.0002 * noise(),
+                toggles_up: u32::from(noise() < 0.1) * 3,
+                toggles_down: u32::from(noise() < 0.1),
+                nodes: nodes_by_level.iter().sum(),
+                triangles: triangles_by_level.iter().sum(),
+                memory_bytes: (noise() * 1e9) as u64,
+                read_bytes: (noise() * 1e6) as u64,
+                arrived: (noise() * 10.0) as u32,
+                waiting: (noise() * 500.0) as u32,
+                evictions: (noise() * 10.0) as u64,
+                nodes_by_level,
+                triangles_by_level,
+                ..FrameReport::default()
+            },
             ..FrameRecord::default()
         }
     };
@@ -198,11 +202,12 @@ fn one_frame_and_none_and_frames_of_nothing_have_a_page_too() {
         check(&page);
         assert_eq!(count(&page, "<figure>"), 16);
     }
-    let nothing = FrameRecord {
+    let report = FrameReport {
         nodes_by_level: vec![0; 2],
         triangles_by_level: vec![0; 2],
-        ..FrameRecord::default()
+        ..FrameReport::default()
     };
+    let nothing = FrameRecord { report, ..FrameRecord::default() };
     let still = Run { frames: vec![nothing; 50], ..Run::default() };
     let page = page(&still, &context(2));
     check(&page);
@@ -212,10 +217,10 @@ fn one_frame_and_none_and_frames_of_nothing_have_a_page_too() {
 #[test]
 fn frames_that_are_no_numbers_do_not_reach_the_page() {
     let mut run = frames(100, 2);
-    run.frames[3].frame_ms = f64::NAN;
-    run.frames[4].estimated_ms = 0.0;
-    run.frames[5].actual_ms = f64::INFINITY;
-    run.frames[6].v_time = f64::NAN;
+    run.frames[3].report.frame_ms = f64::NAN;
+    run.frames[4].report.estimated_ms = 0.0;
+    run.frames[5].report.actual_ms = f64::INFINITY;
+    run.frames[6].report.v_time = f64::NAN;
     check(&page(&run, &context(2)));
 }
 

@@ -7,8 +7,8 @@ use crate::bench::FrameRecord;
 
 pub(super) fn figures(frames: &[FrameRecord]) -> Vec<Figure> {
     let frame = Places::frames(frames);
-    let up = of(frames, |frame| f64::from(frame.toggles_up));
-    let down = of(frames, |frame| -f64::from(frame.toggles_down));
+    let up = of(frames, |frame| f64::from(frame.report.toggles_up));
+    let down = of(frames, |frame| -f64::from(frame.report.toggles_down));
     let averages = [moving_average(&up), moving_average(&down)];
     vec![
         Figure {

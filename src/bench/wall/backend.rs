@@ -5,9 +5,9 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::{Snapshots, process};
-use crate::bench::replay::lock;
-use crate::bench::{Backend, Drawn, Inspect};
 use crate::camera::View;
+use crate::engine::lock;
+use crate::engine::{Backend, Drawn, Inspect};
 use crate::loading::{Arrival, LoadingThread, NodeFiles};
 use crate::render::Renderer;
 use crate::runtime::SceneTree;
@@ -146,7 +146,7 @@ impl Backend for GpuBackend<'_> {
         self.start.elapsed().as_secs_f64() * 1e3
     }
 
-    fn draw(&mut self, _: u64, front: &[u32], view: &View) -> Result<Drawn> {
+    fn draw(&mut self, front: &[u32], view: &View) -> Result<Drawn> {
         let begin = Instant::now();
         self.renderer.draw(front, &view.pose, self.near)?;
         Ok(Drawn { draw_ms: begin.elapsed().as_secs_f64() * 1e3 })

@@ -370,8 +370,10 @@ impl Bar {
     fn frame(&self, frame: &FrameRecord) -> bool {
         self.bar.inc(1);
         if !self.bar.is_hidden() {
-            self.bar
-                .set_message(format!("{:.1} ms, {} triangles", frame.frame_ms, frame.triangles));
+            self.bar.set_message(format!(
+                "{:.1} ms, {} triangles",
+                frame.report.frame_ms, frame.report.triangles
+            ));
         }
         true
     }

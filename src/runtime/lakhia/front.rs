@@ -245,6 +245,7 @@ impl Policy for Lakhia {
         }
         let time = &self.options.time;
         out.covered = self.covered.part();
+        out.keep_visited = self.options.all_siblings;
         out.v_time = self.feedback.v_time;
         out.share_ms = self.feedback.share_ms;
         out.estimated_ms = self.feedback.fixed_ms + self.feedback.v_time * self.load();

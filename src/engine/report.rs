@@ -1,0 +1,61 @@
+//! What a frame was and took.
+
+/// What a frame was and took.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameReport {
+    /// Milliseconds that drawing was expected to take.
+    pub estimated_ms: f64,
+    /// The same without feedback from earlier frames.
+    pub estimated_without_feedback_ms: f64,
+    /// Milliseconds that choosing and drawing took, which is what was estimated.
+    pub actual_ms: f64,
+    /// Milliseconds of the whole frame: the same with what arrived from the loader.
+    pub frame_ms: f64,
+    /// Milliseconds to choose what is drawn.
+    pub select_ms: f64,
+    /// Milliseconds to upload what was loaded and to free what left.
+    pub upload_ms: f64,
+    /// Milliseconds to draw.
+    pub draw_ms: f64,
+    /// `v_time`, milliseconds for a unit of cost.
+    pub v_time: f64,
+    /// `shareTime` of the roots, milliseconds.
+    pub share_ms: f64,
+    /// The part of the image that the nodes were expected to cover, 0 to 1.
+    pub covered: f64,
+    /// Nodes that gave way to their children.
+    pub toggles_up: u32,
+    /// Nodes that replaced their children.
+    pub toggles_down: u32,
+    /// Nodes drawn.
+    pub nodes: u32,
+    /// Triangles drawn.
+    pub triangles: u64,
+    /// Nodes visited by selection.
+    pub visited: u32,
+    /// Of these, nodes outside of the view.
+    pub culled: u32,
+    /// Bytes in use, loads under way included, at their most in this frame.
+    pub memory_bytes: u64,
+    /// Nodes in memory.
+    pub resident: u32,
+    /// Bytes read from files during the frame.
+    pub read_bytes: u64,
+    /// Nodes that became resident before it.
+    pub arrived: u32,
+    /// Nodes that are wanted and not in memory.
+    pub waiting: u32,
+    /// Nodes evicted during the frame.
+    pub evictions: u64,
+    /// Nodes drawn, by level.
+    pub nodes_by_level: Vec<u32>,
+    /// Triangles drawn, by level.
+    pub triangles_by_level: Vec<u64>,
+}
+
+impl FrameReport {
+    /// Toggles in both directions.
+    pub fn toggles(&self) -> u32 {
+        self.toggles_up + self.toggles_down
+    }
+}
