@@ -6,11 +6,13 @@
 
 mod backend;
 mod check_front;
+mod cost_model;
 #[expect(clippy::module_inception)]
 mod engine;
 mod report;
 
 pub use backend::{Backend, Drawn, Inspect};
 pub use check_front::{FrontCheck, FrontFault, FrontRule};
+pub use cost_model::{CostModel, Estimate, Load, Prices};
 pub use engine::{Engine, lock};
 pub use report::FrameReport;

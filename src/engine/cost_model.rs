@@ -1,0 +1,331 @@
+//! What frames take, learned while they are drawn.
+//!
+//! The time of a frame is a sum of what it draws and uploads, each at a price that is not negative.
+//! Prices are fitted by least squares of relative errors over the frames drawn, older ones counting
+//! less, and towards what was expected at first as far as frames say nothing.
+
+use serde::{Deserialize, Serialize};
+
+/// Number of terms.
+const TERMS: usize = 7;
+
+/// Seconds after which a frame counts half.
+const HALF_LIFE_S: f64 = 10.0;
+
+/// No frame takes less; what is said to is a clock's fault.
+const LEAST_MS: f64 = 1e-6;
+
+/// A frame later than this after the one before forgets no more.
+const LONGEST_S: f64 = 1.0;
+
+/// How many frames of an ordinary load the prices at the start are worth.
+const PRIOR_FRAMES: f64 = 0.2;
+
+/// Sweeps of coordinate descent a frame; prices of the frame before are where they start.
+const SWEEPS: usize = 16;
+
+/// What a frame draws and uploads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Load {
+    /// Draw calls.
+    pub draws: f64,
+    /// Vertices.
+    pub vertices: f64,
+    /// Triangles.
+    pub triangles: f64,
+    /// Fragments without a texture, those behind others included.
+    pub plain_fragments: f64,
+    /// Fragments with a texture.
+    pub textured_fragments: f64,
+    /// Bytes uploaded.
+    pub uploaded_bytes: f64,
+}
+
+/// An ordinary load, by which terms are made comparable.
+const ORDINARY: [f64; TERMS] = [1.0, 100.0, 1e5, 1e5, 1e6, 1e6, 1e6];
+
+impl Load {
+    /// The terms of the sum in ordinary loads; the first is what every frame has.
+    fn terms(&self) -> [f64; TERMS] {
+        let terms = [
+            1.0,
+            self.draws,
+            self.vertices,
+            self.triangles,
+            self.plain_fragments,
+            self.textured_fragments,
+            self.uploaded_bytes,
+        ];
+        std::array::from_fn(|at| if terms[at] > 0.0 { terms[at] / ORDINARY[at] } else { 0.0 })
+    }
+}
+
+/// What things take, milliseconds each.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Prices {
+    /// A frame in which nothing is drawn.
+    pub frame: f64,
+    /// A draw call.
+    pub draw: f64,
+    /// A vertex.
+    pub vertex: f64,
+    /// A triangle.
+    pub triangle: f64,
+    /// A fragment without a texture.
+    pub plain_fragment: f64,
+    /// A fragment with a texture.
+    pub textured_fragment: f64,
+    /// A byte that is uploaded.
+    pub uploaded_byte: f64,
+}
+
+impl Prices {
+    fn ordinary(&self) -> [f64; TERMS] {
+        let prices = [
+            self.frame,
+            self.draw,
+            self.vertex,
+            self.triangle,
+            self.plain_fragment,
+            self.textured_fragment,
+            self.uploaded_byte,
+        ];
+        std::array::from_fn(|at| prices[at] * ORDINARY[at])
+    }
+
+    fn from_ordinary(prices: [f64; TERMS]) -> Self {
+        let [
+            frame,
+            draw,
+            vertex,
+            triangle,
+            plain_fragment,
+            textured_fragment,
+            uploaded_byte,
+        ] = std::array::from_fn(|at| prices[at] / ORDINARY[at]);
+        Self { frame, draw, vertex, triangle, plain_fragment, textured_fragment, uploaded_byte }
+    }
+}
+
+/// What a frame should take, milliseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// On average.
+    pub mean_ms: f64,
+    /// Standard deviation.
+    pub deviation_ms: f64,
+}
+
+/// Learns prices from frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CostModel {
+    /// In ordinary loads, as are the next.
+    prices: [f64; TERMS],
+    expected: [f64; TERMS],
+    /// Weight of what is expected.
+    prior: f64,
+    /// Sum over frames of weight × terms × terms.
+    squares: [[f64; TERMS]; TERMS],
+    /// Sum over frames of weight × terms × milliseconds.
+    products: [f64; TERMS],
+    /// Sums over frames of 1, of relative errors, and of their squares.
+    errors: [f64; 3],
+}
+
+impl CostModel {
+    /// Expects these prices until frames tell otherwise.
+    pub fn new(expected: &Prices) -> Self {
+        let expected = expected.ordinary();
+        let whole: f64 = expected.iter().sum();
+        Self {
+            prices: expected,
+            expected,
+            // As frames weigh in which each term is ordinary.
+            prior: if whole > 0.0 { PRIOR_FRAMES / (whole * whole) } else { PRIOR_FRAMES },
+            squares: [[0.0; TERMS]; TERMS],
+            products: [0.0; TERMS],
+            errors: [0.0; 3],
+        }
+    }
+
+    /// What things take, as far as is known.
+    pub fn prices(&self) -> Prices {
+        Prices::from_ordinary(self.prices)
+    }
+
+    /// What a frame should take.
+    pub fn estimate(&self, load: &Load) -> Estimate {
+        let mean_ms = dot(&self.prices, &load.terms());
+        Estimate { mean_ms, deviation_ms: self.relative_deviation() * mean_ms }
+    }
+
+    /// Mean of (estimated − actual) / actual over the frames of late.
+    pub fn relative_bias(&self) -> f64 {
+        let [frames, sum, _] = self.errors;
+        if frames > 0.0 { sum / frames } else { 0.0 }
+    }
+
+    /// Root of the mean square of the same.
+    pub fn relative_deviation(&self) -> f64 {
+        let [frames, _, squares] = self.errors;
+        if frames > 0.0 { (squares / frames).sqrt() } else { 0.0 }
+    }
+
+    /// A frame took `actual_ms`, `dt_s` seconds after the one before. What is no number or took no time
+    /// is passed over.
+    pub fn observe(&mut self, load: &Load, actual_ms: f64, dt_s: f64) {
+        let terms = load.terms();
+        let is_sound = actual_ms > LEAST_MS && terms.iter().chain([&actual_ms]).all(|x| x.is_finite());
+        if !is_sound {
+            return;
+        }
+        // After a pause there is nothing newer than what is known.
+        let kept = libm::exp2(-dt_s.max(0.0).min(LONGEST_S) / HALF_LIFE_S);
+        let error = dot(&self.prices, &terms) / actual_ms - 1.0;
+        let [frames, sum, squares] = self.errors.map(|sum| sum * kept);
+        self.errors = [frames + 1.0, sum + error, squares + error * error];
+        // Relative errors count: a frame of 100 ms must not outweigh a hundred of 10.
+        let weight = 1.0 / (actual_ms * actual_ms);
+        for (row, (squares, product)) in self.squares.iter_mut().zip(&mut self.products).enumerate()
+        {
+            for (square, term) in squares.iter_mut().zip(terms) {
+                *square = *square * kept + weight * terms[row] * term;
+            }
+            *product = *product * kept + weight * terms[row] * actual_ms;
+        }
+        self.fit();
+    }
+
+    /// Non-negative least squares by coordinate descent.
+    fn fit(&mut self) {
+        for _ in 0..SWEEPS {
+            for at in 0..TERMS {
+                let square = self.squares[at][at] + self.prior;
+                let others = dot(&self.squares[at], &self.prices)
+                    - self.squares[at][at] * self.prices[at];
+                let product = self.products[at] + self.prior * self.expected[at];
+                self.prices[at] = ((product - others) / square).max(0.0);
+            }
+        }
+    }
+}
+
+fn dot(a: &[f64; TERMS], b: &[f64; TERMS]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// A slow machine.
+    const PRICES: Prices = Prices {
+        frame: 0.7,
+        draw: 0.02,
+        vertex: 4e-5,
+        triangle: 1e-4,
+        plain_fragment: 4e-6,
+        textured_fragment: 8e-6,
+        uploaded_byte: 2e-7,
+    };
+
+    /// A frame of a walk: what it draws changes in ways that are not all alike.
+    fn load(random: &mut Random) -> Load {
+        let triangles = 2e4 + 6e4 * random.unit();
+        Load {
+            draws: 10.0 + 40.0 * random.unit(),
+            vertices: triangles * (0.6 + 0.6 * random.unit()),
+            triangles,
+            plain_fragments: 4e5 * random.unit(),
+            textured_fragments: 1e6 * random.unit(),
+            uploaded_bytes: if random.unit() < 0.2 { 3e6 * random.unit() } else { 0.0 },
+        }
+    }
+
+    fn exact(prices: &Prices, load: &Load) -> f64 {
+        dot(&prices.ordinary(), &load.terms())
+    }
+
+    /// Relative errors of the last 100 of some frames: their mean and their deviation.
+    fn errors(model: &mut CostModel, prices: &Prices, frames: usize, noise: f64) -> [f64; 2] {
+        let mut random = Random::new(7, 0);
+        let mut errors = Vec::new();
+        for _ in 0..frames {
+            let load = load(&mut random);
+            let actual = exact(prices, &load) * (1.0 + noise * (2.0 * random.unit() - 1.0));
+            errors.push(model.estimate(&load).mean_ms / actual - 1.0);
+            model.observe(&load, actual, 1.0 / 30.0);
+        }
+        let late = &errors[frames - 100..];
+        let mean = late.iter().sum::<f64>() / 100.0;
+        let square = late.iter().map(|error| (error - mean).powi(2)).sum::<f64>() / 100.0;
+        [mean, square.sqrt()]
+    }
+
+    #[test]
+    fn before_any_frame_it_says_what_was_expected() {
+        let (model, load) = (CostModel::new(&PRICES), load(&mut Random::new(1, 0)));
+        let estimate = model.estimate(&load);
+        assert!((estimate.mean_ms - exact(&PRICES, &load)).abs() < 1e-9);
+        assert_eq!(estimate.deviation_ms, 0.0);
+    }
+
+    #[test]
+    fn prices_that_were_expected_wrongly_are_learned() {
+        let fast = Prices::from_ordinary(PRICES.ordinary().map(|price| price / 8.0));
+        let textured = Prices { textured_fragment: 3e-5, draw: 0.0, ..PRICES };
+        for prices in [&fast, &textured, &PRICES] {
+            let mut model = CostModel::new(&PRICES);
+            let [mean, deviation] = errors(&mut model, prices, 300, 0.0);
+            assert!(mean.abs() < 0.01 && deviation < 0.01, "{mean} {deviation} {prices:?}");
+        }
+    }
+
+    #[test]
+    fn noise_is_told_and_not_followed() {
+        let mut model = CostModel::new(&PRICES);
+        // Even between -0.1 and 0.1: a deviation of 0.058.
+        let [mean, deviation] = errors(&mut model, &PRICES, 2000, 0.1);
+        assert!(mean.abs() < 0.01, "{mean}");
+        assert!((0.05..0.065).contains(&deviation), "{deviation}");
+        assert!((0.05..0.065).contains(&model.relative_deviation()));
+        assert!(model.relative_bias().abs() < 0.01);
+    }
+
+    #[test]
+    fn a_machine_that_becomes_slower_is_followed_within_seconds() {
+        let mut model = CostModel::new(&PRICES);
+        errors(&mut model, &PRICES, 3000, 0.05);
+        let slower = Prices::from_ordinary(PRICES.ordinary().map(|price| price * 2.0));
+        let [mean, _] = errors(&mut model, &slower, 1800, 0.05);
+        assert!(mean.abs() < 0.05, "{mean}");
+    }
+
+    #[test]
+    fn no_price_is_negative_however_frames_fall_out() {
+        let mut model = CostModel::new(&PRICES);
+        let mut random = Random::new(3, 0);
+        for _ in 0..500 {
+            let load = load(&mut random);
+            // Dearer the less is drawn.
+            model.observe(&load, 1e6 / load.triangles, 1.0 / 30.0);
+            assert!(model.prices.iter().all(|price| *price >= 0.0), "{:?}", model.prices);
+        }
+    }
+
+    #[test]
+    fn odd_frames_leave_sound_figures() {
+        let mut model = CostModel::new(&PRICES);
+        let odd = [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-300, 1e12];
+        for actual in odd {
+            for value in odd {
+                for dt_s in odd {
+                    model.observe(&Load { triangles: value, draws: 1.0, ..Load::default() }, actual, dt_s);
+                }
+            }
+        }
+        let estimate = model.estimate(&load(&mut Random::new(1, 0)));
+        assert!(estimate.mean_ms.is_finite() && estimate.deviation_ms.is_finite(), "{estimate:?}");
+    }
+}
