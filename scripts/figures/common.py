@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS = ROOT / "docs"
 DATA = Path(os.environ.get("HLOD_DATA", ROOT.parent / "shared" / "data"))
 
-# Real data that builds are timed on.
+# Folders of the real data, each a city or a site.
 REAL = [
     "sceaux",
     "oblique_a",

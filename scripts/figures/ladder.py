@@ -7,7 +7,17 @@ import resource
 import shutil
 import subprocess
 
-from common import DOCS, Options, Programs, machine, real_data, say, table, write_between_markers
+from common import (
+    DOCS,
+    REAL,
+    Options,
+    Programs,
+    machine,
+    real_data,
+    say,
+    table,
+    write_between_markers,
+)
 
 # The names that examples/build_with.rs knows, and what build.json calls them.
 STEPS = {
@@ -18,19 +28,7 @@ STEPS = {
     "clustering": "vertex clustering",
     "prisms": "extruded footprints of separate bodies",
 }
-SETS = [
-    "sceaux",
-    "oblique_a",
-    "oblique_b",
-    "ingolstadt",
-    "torcs_street1",
-    "hamada",
-    "wageningen",
-    "lyon_roads",
-    "lyon_houses",
-    "3dfier",
-    "glb",
-]
+SETS = [*REAL, "glb"]
 SAMPLES = 100_000
 
 

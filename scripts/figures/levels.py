@@ -4,27 +4,14 @@ import json
 import shutil
 import subprocess
 
-from common import DOCS, Options, Programs, real_data, run, say, table, write_between_markers
+from common import DOCS, REAL, Options, Programs, real_data, run, say, table, write_between_markers
 
-# Folders of the real data.
-SETS = [
-    "sceaux",
-    "oblique_a",
-    "oblique_b",
-    "ingolstadt",
-    "torcs_street1",
-    "hamada",
-    "wageningen",
-    "lyon_roads",
-    "lyon_houses",
-    "3dfier",
-]
 PAGE = DOCS / "levels.md"
 
 
 def main():
     options = Options("levels", __doc__)
-    options.add_argument("--sets", nargs="+", choices=SETS, default=SETS, help="[all]")
+    options.add_argument("--sets", nargs="+", choices=REAL, default=REAL, help="[all]")
     arguments = options.parse()
     examples = ["level_views", "tile_pictures"]
     programs = Programs(examples=examples, features=True)
