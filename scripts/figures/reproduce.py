@@ -109,8 +109,11 @@ def conditions(arguments, rows):
         drawn = f"drawn by {adapter['name']}{workers}"
     return (
         f"Target 30 ms, 1280 × 720, {drawn}, {arguments.frames} frames a path after "
-        f"{min(SETTLE, arguments.frames)} frames at its first pose, all constants as in the "
-        "thesis's table 6.1. *Error* is (actual − estimated) / estimated, mean ± deviation. *Late* "
+        f"{min(SETTLE, arguments.frames)} frames at its first pose, constants as in the "
+        "thesis's table 6.1, but for `c_textured` (0.127 there, 0.6 by default here, where textures "
+        "take the longer part); feedback on `shareTime` waits for counters on their way "
+        "(`--share-feedback damped`), which start where their nodes are affordable (`--hyst-start`). "
+        "*Error* is (actual − estimated) / estimated, mean ± deviation. *Late* "
         "are frames over the target by more than a tenth. In brackets: the thesis's figures."
     )
 
