@@ -9,10 +9,10 @@ use super::*;
 use crate::camera::{CameraPath, PathFrame, Pose, View, from_angles};
 use crate::format::Scene;
 use crate::mesh::UpAxis;
-use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection};
 use crate::runtime::lakhia::{Lakhia, TimeModel};
 use crate::runtime::residency::{Residency, ResidencyOptions, Sizes};
 use crate::runtime::test_tree::{Sketch, scene, sketch};
+use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection};
 
 /// A street of houses along x, each of three levels with two children a node.
 fn street(houses: usize) -> Scene {
@@ -251,7 +251,13 @@ impl Policy for Overlapping {
         "overlapping"
     }
 
-    fn select(&mut self, tree: &SceneTree, view: &View, residents: &Residents, out: &mut Selection) {
+    fn select(
+        &mut self,
+        tree: &SceneTree,
+        view: &View,
+        residents: &Residents,
+        out: &mut Selection,
+    ) {
         out.clear();
         self.0 += 1;
         let child = tree.children(tree.roots()[0])[0];

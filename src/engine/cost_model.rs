@@ -94,15 +94,8 @@ impl Prices {
     }
 
     fn from_ordinary(prices: [f64; TERMS]) -> Self {
-        let [
-            frame,
-            draw,
-            vertex,
-            triangle,
-            plain_fragment,
-            textured_fragment,
-            uploaded_byte,
-        ] = std::array::from_fn(|at| prices[at] / ORDINARY[at]);
+        let [frame, draw, vertex, triangle, plain_fragment, textured_fragment, uploaded_byte] =
+            std::array::from_fn(|at| prices[at] / ORDINARY[at]);
         Self { frame, draw, vertex, triangle, plain_fragment, textured_fragment, uploaded_byte }
     }
 }
@@ -175,12 +168,14 @@ impl CostModel {
     /// is passed over.
     pub fn observe(&mut self, load: &Load, actual_ms: f64, dt_s: f64) {
         let terms = load.terms();
-        let is_sound = actual_ms > LEAST_MS && terms.iter().chain([&actual_ms]).all(|x| x.is_finite());
+        let is_sound =
+            actual_ms > LEAST_MS && terms.iter().chain([&actual_ms]).all(|x| x.is_finite());
         if !is_sound {
             return;
         }
         // After a pause there is nothing newer than what is known.
-        let kept = libm::exp2(-dt_s.max(0.0).min(LONGEST_S) / HALF_LIFE_S);
+        let dt_s = if dt_s.is_nan() { LONGEST_S } else { dt_s.clamp(0.0, LONGEST_S) };
+        let kept = libm::exp2(-dt_s / HALF_LIFE_S);
         let error = dot(&self.prices, &terms) / actual_ms - 1.0;
         let [frames, sum, squares] = self.errors.map(|sum| sum * kept);
         self.errors = [frames + 1.0, sum + error, squares + error * error];
@@ -201,8 +196,8 @@ impl CostModel {
         for _ in 0..SWEEPS {
             for at in 0..TERMS {
                 let square = self.squares[at][at] + self.prior;
-                let others = dot(&self.squares[at], &self.prices)
-                    - self.squares[at][at] * self.prices[at];
+                let others =
+                    dot(&self.squares[at], &self.prices) - self.squares[at][at] * self.prices[at];
                 let product = self.products[at] + self.prior * self.expected[at];
                 self.prices[at] = ((product - others) / square).max(0.0);
             }
@@ -321,7 +316,11 @@ mod tests {
         for actual in odd {
             for value in odd {
                 for dt_s in odd {
-                    model.observe(&Load { triangles: value, draws: 1.0, ..Load::default() }, actual, dt_s);
+                    model.observe(
+                        &Load { triangles: value, draws: 1.0, ..Load::default() },
+                        actual,
+                        dt_s,
+                    );
                 }
             }
         }
