@@ -32,6 +32,7 @@ fn every_option() -> Vec<HierarchyOptions> {
                         simplify_from,
                         borders,
                         simplifier,
+                        constants: all_nodes(),
                         ..Default::default()
                     });
                 }

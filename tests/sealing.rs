@@ -215,6 +215,7 @@ fn every_option(borders: BorderMode) -> Vec<HierarchyOptions> {
                     simplify_from,
                     simplifier,
                     borders,
+                    constants: all_nodes(),
                     ..Default::default()
                 });
             }

@@ -16,8 +16,10 @@ use crate::builder::border::shared::{
     Bounds, bounds_of, is_of_shared, keep_shared, shared_positions,
 };
 use crate::builder::cut::split::Chunk;
-use crate::builder::emit::disk_sink::{DiskSink, NodeRecord};
-use crate::builder::hierarchy::{BlockBuilder, HierarchyOptions, Resolutions, Tree};
+use crate::builder::emit::disk_sink::{DiskSink, NodeRecord, file_name};
+use crate::builder::hierarchy::{
+    BlockBuilder, Forest, HierarchyOptions, LeftOut, Resolutions, Tree,
+};
 use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
 use crate::builder::simplify::aggregate::{BodyRules, Extrudable};
@@ -29,6 +31,7 @@ use crate::format::{BlockInfo, Encoding, OutputDir};
 use crate::lattice::Lattice;
 use crate::lattice::Quantization;
 use crate::mesh::{Material, Model, Part, PositionKey, UpAxis, Warnings, key};
+use crate::report::build_report::LeftOutNode;
 use crate::texture::{
     BakeClasses, BlockTextures, Seams, SharedTextures, TextureCache, TextureOptions, TexturePlan,
     TextureUse, texture_factors,
@@ -39,8 +42,8 @@ use crate::texture::{
 pub struct BuiltBlock {
     /// For `scene.hlod`.
     pub info: BlockInfo,
-    /// Its nodes.
-    pub tree: Tree<NodeRecord>,
+    /// Its nodes: one tree, or several where roots are left out.
+    pub trees: Vec<Tree<NodeRecord>>,
 }
 
 impl BuiltBlock {
@@ -50,7 +53,7 @@ impl BuiltBlock {
             visit(&tree.record);
             tree.children.iter().for_each(|child| down(child, visit));
         }
-        down(&self.tree, visit);
+        self.trees.iter().for_each(|tree| down(tree, visit));
     }
 }
 
@@ -58,6 +61,8 @@ impl BuiltBlock {
 pub struct BuiltInput {
     /// In the order of the source.
     pub blocks: Vec<BuiltBlock>,
+    /// Coarse nodes that are not written, by file.
+    pub left_out: Vec<LeftOutNode>,
     /// Different source texels that its triangles use, repeating textures aside.
     pub used_texels: u64,
     /// Open edges between which there are stitches ([`crate::builder::stitch`]).
@@ -262,20 +267,29 @@ pub fn build_input(
             sink: &sink,
             stages,
         };
-        let tree = builder.build(chunk)?;
+        let Forest { trees, left_out } = builder.build(chunk)?;
+        let left_out = left_out.into_iter().map(|LeftOut { child_path, triangles, kept }| {
+            LeftOutNode { file: file_name(&sink.prefix, &child_path), triangles, kept }
+        });
         let info =
             BlockInfo { name, input: crate::builder::inputs::text_of(&model.source), origin };
-        Ok((Some(BuiltBlock { info, tree }), warnings, textures.used_texels()))
+        let block = BuiltBlock { info, trees };
+        Ok((Some((block, left_out.collect())), warnings, textures.used_texels()))
     })?;
     let mut blocks = Vec::with_capacity(built.len());
+    let mut left_out: Vec<LeftOutNode> = Vec::new();
     let mut used_texels = 0;
     for (block, block_warnings, texels) in built {
-        blocks.extend(block);
+        if let Some((block, of_block)) = block {
+            blocks.push(block);
+            left_out.extend::<Vec<_>>(of_block);
+        }
         warnings.extend(block_warnings);
         used_texels += texels;
     }
     warnings.extend(cache.warnings());
-    Ok(BuiltInput { blocks, used_texels, stitched_edges, warnings })
+    left_out.sort_by(|a, b| a.file.cmp(&b.file));
+    Ok(BuiltInput { blocks, left_out, used_texels, stitched_edges, warnings })
 }
 
 /// The stitches within each plan, and the positions between which there are stitches from one plan

@@ -26,6 +26,8 @@ pub struct Constants {
     pub simplify: SimplifyConstants,
     /// Extruded footprints for small bodies.
     pub prisms: PrismConstants,
+    /// What coarse nodes keep of their source's outline.
+    pub outline: OutlineConstants,
     /// How errors are found.
     pub measure: MeasureConstants,
 }
@@ -272,6 +274,27 @@ impl Default for PrismConstants {
             least_walls: 0.3,
             wall_rise: 0.5,
         }
+    }
+}
+
+/// What coarse nodes keep of the outline of their source ([`crate::mesh::OutlineFrame`]).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OutlineConstants {
+    /// A coarse node that keeps a smaller share of the covered ground or of the skyline is not
+    /// written, 0–1; 0: all are.
+    pub least_kept: f64,
+    /// Before a node is left out, it is given so many times the triangles again and again, over 1.
+    pub more_triangles: f64,
+    /// But no more than this share of those of its children, 0–1.
+    pub most_triangles: f64,
+    /// Along the longer side of a node's ground, and columns of each skyline, 1 or more.
+    pub cells: usize,
+}
+
+impl Default for OutlineConstants {
+    fn default() -> Self {
+        Self { least_kept: 0.9, more_triangles: 1.5, most_triangles: 0.9, cells: 256 }
     }
 }
 

@@ -193,6 +193,7 @@ impl Run<'_> {
             up,
             up_from: Some(up_from),
             outcomes,
+            left_out: built.left_out,
             warnings: Count::of_warnings(&warnings),
         };
         Ok((built.blocks, report))
@@ -417,10 +418,12 @@ fn scene_of(
     let numbers: BTreeMap<String, u32> = shared_textures.keys().cloned().zip(0u32..).collect();
     let mut nodes = Vec::new();
     let mut infos: Vec<BlockInfo> = Vec::with_capacity(blocks.len());
-    for mut block in blocks {
-        make_errors_monotone(&mut block.tree);
-        append_nodes(&mut nodes, block.tree, infos.len() as u32, &numbers);
-        infos.push(block.info);
+    for BuiltBlock { info, trees } in blocks {
+        for mut tree in trees {
+            make_errors_monotone(&mut tree);
+            append_nodes(&mut nodes, tree, infos.len() as u32, &numbers);
+        }
+        infos.push(info);
     }
     if nodes.is_empty() {
         return Err(Error::Internal("a build without nodes".into()));

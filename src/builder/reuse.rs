@@ -74,6 +74,8 @@ impl Earlier {
     /// Links the files of an input's blocks into the new output.
     pub fn take_over(&self, input: &InputReport, output: &OutputDir) -> Result<Taken> {
         let mut taken = Taken { blocks: Vec::new(), shared_textures: BTreeMap::new() };
+        // A block's roots, of which there may be several, follow one another.
+        let mut last = None;
         for root in self.scene.roots() {
             let Some(block) = self.scene.nodes[root as usize].block else { continue };
             let info = &self.scene.blocks[block as usize];
@@ -81,7 +83,11 @@ impl Earlier {
                 continue;
             }
             let tree = self.tree(root, output, &mut taken)?;
-            taken.blocks.push(BuiltBlock { info: info.clone(), tree });
+            match taken.blocks.last_mut() {
+                Some(built) if last == Some(block) => built.trees.push(tree),
+                _ => taken.blocks.push(BuiltBlock { info: info.clone(), trees: vec![tree] }),
+            }
+            last = Some(block);
         }
         for name in taken.shared_textures.keys() {
             // Several inputs may share a picture.
@@ -136,7 +142,6 @@ impl Earlier {
                 p95_error: node.p95_error,
                 pictures: node.pictures.clone(),
                 shared,
-                level: node.level,
                 budget: over.map_or(0, |over| over.budget as usize),
                 step: None,
                 baked: baked.map(|baked| baked.reason),

@@ -15,7 +15,8 @@ use crate::{Error, Result};
 pub struct NodeLabel {
     /// [`Node::id`](super::Node::id).
     pub id: u64,
-    /// [`Node::level`](super::Node::level).
+    /// [`Node::level`](super::Node::level) as it is where no coarse node is left out: the depth of its
+    /// division.
     pub level: u32,
 }
 

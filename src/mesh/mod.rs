@@ -5,6 +5,7 @@ mod coordinate;
 mod disjoint_set;
 mod material;
 mod model;
+mod outline;
 mod polygon;
 mod surface;
 mod triangle_mesh;
@@ -13,6 +14,7 @@ pub use coordinate::{Coordinate, Key, PositionKey, color_key, key, texcoord_key,
 pub(crate) use disjoint_set::DisjointSet;
 pub use material::{AlphaMode, Material, TextureData, TextureSource, Wrap};
 pub use model::{Group, Model, Part, UpAxis, Warnings};
+pub use outline::{Kept, Outline, OutlineFrame};
 pub(crate) use polygon::Triangulator;
 pub(crate) use surface::Surface;
 pub use triangle_mesh::Mesh;

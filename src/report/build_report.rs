@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::mesh::{UpAxis, Warnings};
+use crate::mesh::{Kept, UpAxis, Warnings};
 use crate::texture::BakeReason;
 use crate::{Error, Result};
 
@@ -54,7 +54,7 @@ pub struct BuildReport {
 }
 
 /// An input of the command line. Whoever takes over its nodes takes over all of this with them.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InputReport {
     /// As given, or as found in a given folder.
     pub path: String,
@@ -75,6 +75,9 @@ pub struct InputReport {
     pub up_from: Option<UpFrom>,
     /// How often each step of the ladder made one of its nodes, most frequent first.
     pub outcomes: Vec<Count>,
+    /// Coarse nodes that are not written, by file.
+    #[serde(default)]
+    pub left_out: Vec<LeftOutNode>,
     /// What was imperfect in it and how often, in the order in which it was met.
     pub warnings: Vec<Count>,
 }
@@ -227,6 +230,19 @@ pub struct OverBudget {
     pub triangles: u64,
     /// Why.
     pub reason: String,
+}
+
+/// A coarse node that is not written, since it would keep less than nine tenths of the ground that
+/// its source covers, or of its skyline, even with almost as many triangles as those below it. These
+/// stand in its place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftOutNode {
+    /// The name that its file would have.
+    pub file: String,
+    /// The triangles that it would have.
+    pub triangles: u64,
+    /// What it would keep with these.
+    pub kept: Kept,
 }
 
 /// A node that was simplified across texture seams and has a texture of its own.

@@ -70,6 +70,15 @@ pub fn built(report: &BuildReport, out: &Path) -> String {
             "  {stitched} border edges touch others without shared vertices: joined on coarse levels"
         );
     }
+    let left_out: usize = report.inputs.iter().map(|input| input.left_out.len()).sum();
+    if left_out > 0 {
+        let nodes = if left_out == 1 { "node" } else { "nodes" };
+        let _ = writeln!(
+            text,
+            "  {left_out} coarse {nodes} left out: too little of the covered ground or of the \
+             skyline was kept (left_out in build.json)"
+        );
+    }
     if let Some(quantized) = &report.quantized {
         let Quantized { step_metres, bound_metres, large_nodes } = quantized;
         let _ = write!(

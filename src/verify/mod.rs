@@ -33,7 +33,7 @@ mod node_errors;
 mod node_textures;
 mod options;
 mod other_sources;
-mod outline;
+mod outlines;
 mod points;
 mod progress;
 mod report;
@@ -56,8 +56,8 @@ use glam::DVec3;
 pub use options::{Limits, VerifyOptions};
 pub use progress::{Progress, Silent};
 pub use report::{
-    Check, Distance, ErrorFigures, Failure, GapFigures, Kept, LeafFigures, LevelFigures,
-    NodeFigures, SceneFacts, TileFigures, VerifyReport,
+    Check, Distance, ErrorFigures, Failure, GapFigures, LeafFigures, LevelFigures, NodeFigures,
+    SceneFacts, TileFigures, VerifyReport,
 };
 pub use text::text;
 
@@ -67,11 +67,13 @@ use distance::{FrontDistances, NodeDistances};
 use front::Front;
 use geometry::NodeGeometry;
 use node_textures::NodeTextures;
+use outlines::Outlines;
 use points::Points;
 use source::Source;
 
 use crate::format::{SCENE_FILE, Scene};
 use crate::lattice::Quantization;
+use crate::mesh::Kept;
 use crate::place::placement_of;
 use crate::{Error, Result};
 
@@ -262,14 +264,10 @@ impl Verification<'_> {
         };
         let diagonal = report.scene.as_ref().map_or(0.0, |facts| facts.diagonal);
         let mut all: Vec<NodeDistances> = Vec::new();
-        let frame = outline::Frame::around(scene.up, leaves, geometry);
-        let outline = frame.as_ref().map(|frame| frame.outline(leaves, geometry));
-        let kept = |front: &Front| match (&frame, &outline) {
-            (Some(frame), Some(outline)) => {
-                let nodes: Vec<u32> = front.nodes().collect();
-                outline.kept_by(&frame.outline(&nodes, geometry))
-            }
-            _ => Kept::default(),
+        let outlines = Outlines::of(scene.up, leaves, geometry);
+        let kept = |front: &Front| {
+            let nodes: Vec<u32> = front.nodes().collect();
+            outlines.as_ref().map_or_else(Kept::default, |outlines| outlines.kept_by(&nodes))
         };
         let measure = |front: &Front, level: Option<u32>| {
             let seed = options.seed;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::options::VerifyOptions;
+use crate::mesh::Kept;
 use crate::{Error, Result};
 
 /// Failures of one check that are listed; the others are counted.
@@ -175,7 +176,7 @@ pub struct LevelFigures {
     pub to_source: Distance,
     /// The larger of both.
     pub two_sided: Distance,
-    /// What it keeps of the outline of the leaves.
+    /// What it keeps of the outline of the leaves, by 4,096 cells.
     pub kept: Kept,
     /// RMS colour difference, sRGB 0–255, between points of the source and what stands for them: the
     /// nearest surface within 60 degrees of facing the same way. `None` where nothing could be
@@ -186,22 +187,6 @@ pub struct LevelFigures {
     pub color_share: Option<f64>,
     /// Tiles of generated cities; `None` elsewhere.
     pub tiles: Option<TileFigures>,
-}
-
-/// What a front keeps of the ground that the source covers, seen from above, and of its skylines,
-/// seen from sixteen sides: shares of the source, 0–1, by a grid of 4,096 cells along the longer
-/// side and skylines of 4,096 columns. `None` where the source covers nothing.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Kept {
-    /// Of the covered ground, what is covered still.
-    pub area: Option<f64>,
-    /// What is covered besides, over the area of the source; may exceed 1.
-    pub area_added: Option<f64>,
-    /// Of the area between each column's lowest point and the skyline, what is below the front's
-    /// skyline still.
-    pub skyline: Option<f64>,
-    /// How far the front's skyline is above the source's, over the same area; may exceed 1.
-    pub skyline_added: Option<f64>,
 }
 
 /// How many samples show the right tile.

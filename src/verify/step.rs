@@ -25,41 +25,50 @@ pub(super) fn fine_steps(scene: &Scene) -> Vec<f64> {
     fine_lattices(scene).into_iter().map(|fine| fine.step).collect()
 }
 
+/// What a node is of: a block, or where it is of none, the tree below a root.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Block {
+    Number(u32),
+    Root(u32),
+}
+
 fn fine_lattices(scene: &Scene) -> Vec<Lattice> {
-    let roots: Vec<u32> = (0..scene.nodes.len() as u32)
-        .map(|node| line(scene, node).last().unwrap_or(node))
-        .collect();
-    let mut boxes: BTreeMap<u32, [[f64; 3]; 2]> = BTreeMap::new();
-    for (node, &root) in scene.nodes.iter().zip(&roots) {
+    // A block may have several roots.
+    let block_of = |number: u32| match scene.nodes[number as usize].block {
+        Some(block) => Block::Number(block),
+        None => Block::Root(line(scene, number).last().unwrap_or(number)),
+    };
+    let of_nodes: Vec<Block> = (0..scene.nodes.len() as u32).map(block_of).collect();
+    let mut boxes: BTreeMap<Block, [[f64; 3]; 2]> = BTreeMap::new();
+    for (node, &block) in scene.nodes.iter().zip(&of_nodes) {
         // Coarse nodes may reach beyond the source; leaves do not.
         if node.first_child.is_some() {
             continue;
         }
-        let [low, high] = boxes.entry(root).or_insert([node.bbox_min, node.bbox_max]);
+        let [low, high] = boxes.entry(block).or_insert([node.bbox_min, node.bbox_max]);
         for axis in 0..3 {
             low[axis] = low[axis].min(node.bbox_min[axis]);
             high[axis] = high[axis].max(node.bbox_max[axis]);
         }
     }
-    // Trees that share a lattice, with the largest extent and coordinate.
-    let mut groups: BTreeMap<(&str, Option<u32>), [f64; 2]> = BTreeMap::new();
-    let group_of = |root: u32| {
-        let block = scene.nodes[root as usize].block;
-        let block = block.and_then(|block| scene.blocks.get(block as usize));
-        let stray = block.is_some_and(|block| block.name.ends_with("(far off)"));
-        (block.map_or("", |block| block.input.as_str()), stray.then_some(root))
+    // Blocks that share a lattice, with the largest extent and coordinate.
+    let mut groups: BTreeMap<(&str, Option<Block>), [f64; 2]> = BTreeMap::new();
+    let group_of = |block: Block| {
+        let Block::Number(number) = block else { return ("", None) };
+        let Some(info) = scene.blocks.get(number as usize) else { return ("", None) };
+        (info.input.as_str(), info.name.ends_with("(far off)").then_some(block))
     };
-    for (&root, [low, high]) in &boxes {
-        let [extent, magnitude] = groups.entry(group_of(root)).or_default();
+    for (&block, [low, high]) in &boxes {
+        let [extent, magnitude] = groups.entry(group_of(block)).or_default();
         for axis in 0..3 {
             *extent = extent.max(high[axis] - low[axis]);
             *magnitude = magnitude.max(low[axis].abs()).max(high[axis].abs());
         }
     }
-    roots
+    of_nodes
         .iter()
-        .map(|&root| {
-            let [extent, magnitude] = groups.get(&group_of(root)).copied().unwrap_or_default();
+        .map(|&block| {
+            let [extent, magnitude] = groups.get(&group_of(block)).copied().unwrap_or_default();
             Lattice::for_extent(extent * (1.0 + 1e-6), magnitude)
         })
         .collect()

@@ -6,9 +6,10 @@ pub mod rays;
 use std::sync::Mutex;
 
 use hlod::builder::border::vertex::Border;
+use hlod::builder::constants::{Constants, OutlineConstants};
 use hlod::builder::cut::split::Chunk;
 use hlod::builder::hierarchy::{
-    BlockBuilder, HierarchyOptions, NodeDraft, NodeSink, Resolutions, Tree,
+    BlockBuilder, Forest, HierarchyOptions, NodeDraft, NodeSink, Resolutions,
 };
 use hlod::builder::simplify::Extrudable;
 use hlod::builder::simplify::simplified::LadderStep;
@@ -183,6 +184,12 @@ pub fn at_level(nodes: &[Kept], level: usize) -> Vec<&Kept> {
     nodes.iter().filter(of).collect()
 }
 
+/// Every coarse node is written with its own budget, however little it keeps of its source's outline.
+pub fn all_nodes() -> Constants {
+    let outline = OutlineConstants { least_kept: 0.0, ..Default::default() };
+    Constants { outline, ..Default::default() }
+}
+
 /// Keeps all nodes.
 #[derive(Default)]
 pub struct MemorySink(pub Mutex<Vec<Kept>>);
@@ -230,7 +237,7 @@ pub fn build_baked(
         sink: &sink,
         stages: &Default::default(),
     };
-    let _tree: Tree<()> = builder.build(chunk).unwrap();
+    let _forest: Forest<()> = builder.build(chunk).unwrap();
     let mut nodes = sink.0.into_inner().unwrap();
     nodes.sort_by(|a, b| (a.level, &a.child_path).cmp(&(b.level, &b.child_path)));
     nodes

@@ -9,12 +9,12 @@ use hlod::verify::{Silent, VerifyOptions, verify};
 use tempfile::TempDir;
 
 use crate::support::inputs::write;
-use crate::support::result::Built;
+use crate::support::result::{Built, report};
 use crate::support::{Random, run_build};
 
 /// A town without groups: 1,500 closed shells with gables, of 16 triangles, at odd angles; each of
 /// `halls` in a hundred of them fifteen times as large.
-fn town(folder: &Path, halls: usize) {
+pub fn town(folder: &Path, halls: usize) {
     let mut random = Random::new(5, 0);
     let mut text = String::new();
     for house in 0..1500 {
@@ -69,12 +69,12 @@ fn built(halls: usize) -> TempDir {
 fn small_houses_are_not_cut() {
     let folder = built(0);
     let scene = Scene::read(&folder.path().join("out")).unwrap();
-    let leaves = scene.nodes.iter().filter(|node| node.first_child.is_none());
-    let triangles = leaves.map(|node| u64::from(node.triangles)).sum::<u64>();
+    let leaves = || scene.nodes.iter().filter(|node| node.first_child.is_none());
+    let triangles = leaves().map(|node| u64::from(node.triangles)).sum::<u64>();
     // Where houses crowd, one may be wider than half of what is cut: so in half of the towns tried.
     let added = triangles.checked_sub(1500 * 16).expect("all houses are there");
     assert!(added * 100 < 1500 * 16, "{added} triangles more");
-    assert!(scene.nodes.iter().map(|node| node.level).max() > Some(2));
+    assert!(leaves().count() > 50);
 }
 
 #[test]
@@ -127,7 +127,8 @@ fn no_triangle_goes_from_one_material_to_another() {
     let palette = colors(leaf);
     assert_eq!(palette.len(), 2, "{palette:?}");
     let coarse: Vec<usize> = (0..built.meshes.len()).filter(|&node| !built.is_leaf(node)).collect();
-    assert!(coarse.len() > 20);
+    // Those that would lose too many houses are left out.
+    assert!(coarse.len() > 10);
     for node in coarse {
         let found = colors(node);
         assert!(found.is_subset(&palette), "node {node}: {found:?}");
@@ -174,13 +175,18 @@ fn blocks_have_as_many_houses_as_their_root_can_stand_for() {
         run_build(folder.path(), &["--quiet", "--desired-tris", "300", "town.obj", "out"]);
         let out = folder.path().join("out");
         let built = Built::read(&out);
+        // Those that need more triangles to keep what they should of the houses.
+        let report = report(&out);
+        let excused = report["over_budget"].as_array().unwrap();
         let mut houses = 0;
         for root in (0..built.meshes.len()).filter(|&node| built.scene.nodes[node].level == 0) {
             let triangles: u32 =
                 built.leaves_below(root).iter().map(|&l| built.scene.nodes[l].triangles).sum();
             // Where they stand side by side, for twice as many.
             assert!(triangles <= 100 * 16, "{triangles}");
-            assert!(built.is_leaf(root) || built.scene.nodes[root].triangles <= 330);
+            let node = &built.scene.nodes[root];
+            let is_excused = || excused.iter().any(|entry| entry["id"] == node.id);
+            assert!(built.is_leaf(root) || node.triangles <= 330 || is_excused());
             houses += triangles / 16;
         }
         assert_eq!(houses, 1500, "none is cut");

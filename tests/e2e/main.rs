@@ -12,6 +12,7 @@ mod golden;
 mod groups;
 mod houses;
 mod incremental;
+mod left_out;
 mod output;
 mod paths;
 mod quantize;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use hlod::builder::BuildOptions;
+use hlod::verify::{Silent, VerifyOptions, verify};
 use hlod::{Error, import};
 
 use crate::support::build_with;
@@ -78,6 +79,14 @@ fn check(set: &str) {
             node.triangles
         );
     }
+    let options = VerifyOptions { samples: 5_000, ..VerifyOptions::default() };
+    let verified = verify(&out, &[], &options, &Silent).unwrap();
+    let failed: Vec<_> = verified.checks.iter().filter(|check| !check.passed).collect();
+    assert!(failed.is_empty(), "{set}: {failed:?}");
+    // Nodes are judged one by one, on coarser grids.
+    for level in &verified.levels {
+        assert!(level.kept.least() > 0.89, "{set}: level {} keeps {:?}", level.level, level.kept);
+    }
     println!(
         "{set}: {} nodes, {} of them over budget, {} s",
         built.scene.nodes.len(),
@@ -100,7 +109,9 @@ sets! {
     oblique_a: "oblique_a",
     ingolstadt: "ingolstadt",
     torcs_street1: "torcs_street1",
+    oblique_b: "oblique_b",
     hamada: "hamada",
+    lyon_houses: "lyon_houses",
     wageningen: "wageningen",
     lyon_roads: "lyon_roads",
     a_3dfier_terrain: "3dfier",

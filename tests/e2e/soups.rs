@@ -246,6 +246,9 @@ fn check_budgets(
         *excused.entry(kind).or_insert(0) += 1;
     }
     for root in built.scene.roots() {
+        let block = built.scene.nodes[root as usize].block;
+        let is_of_block = |&other: &u32| built.scene.nodes[other as usize].block == block;
+        let has_root = built.scene.roots().filter(is_of_block).count() == 1;
         let mut open = vec![root as usize];
         while let Some(index) = open.pop() {
             open.extend(built.scene.children(index as u32).map(|child| child as usize));
@@ -258,11 +261,11 @@ fn check_budgets(
                 .iter()
                 .map(|&leaf| u64::from(built.scene.nodes[leaf].triangles))
                 .sum();
-            // A root has the triangles that are desired. Below it a step of simplification divides
+            // A block's root has the triangles that are desired. Below it a step of simplification divides
             // by the root of the level factor at least, which is what rounding the number of steps
             // leaves of it.
             let hierarchy = &options.hierarchy;
-            let budget = match index == root as usize {
+            let budget = match has_root && index == root as usize {
                 true => f64::from(hierarchy.desired_tris),
                 false => below as f64 / f64::from(hierarchy.level_factor).sqrt(),
             };

@@ -10,7 +10,7 @@ use crate::format::attributes::{Attributes, attributes};
 use crate::format::{
     Encoding, NODES_DIR, NodeImageData, NodeLabel, OutputDir, file_crc, write_glb_encoded,
 };
-use crate::mesh::{Mesh, UpAxis, Warnings};
+use crate::mesh::{Kept, Mesh, UpAxis, Warnings};
 use crate::texture::{AppendedSkirts, BakeReason, BakedMesh, BlockTextures, TexturedNode};
 use crate::{Error, Result};
 
@@ -39,9 +39,7 @@ pub struct NodeRecord {
     pub pictures: Vec<[u32; 2]>,
     /// Texels and names of the shared pictures that it uses.
     pub shared: Vec<(String, u64)>,
-    /// Steps from its root.
-    pub level: u32,
-    /// The triangles that it may have.
+    /// The triangles that it should have at most.
     pub budget: usize,
     /// How it was made; `None` where it was taken over from an earlier build.
     pub step: Option<LadderStep>,
@@ -82,6 +80,15 @@ pub struct DiskSink<'a> {
     pub progress: &'a dyn Progress,
 }
 
+/// The name of a node's file: of its block, and child numbers from the block's root down.
+pub fn file_name(prefix: &str, child_path: &[u32]) -> String {
+    let child_path: Vec<String> = child_path.iter().map(u32::to_string).collect();
+    match &child_path[..] {
+        [] => format!("{prefix}.glb"),
+        numbers => format!("{prefix}-{}.glb", numbers.join(".")),
+    }
+}
+
 /// The identity of a node: 48 bits of a hash of its file name, so that a rebuild of the same
 /// source gives the same ids whatever else changed. Fits in a JSON number.
 pub fn node_id(file: &str) -> u64 {
@@ -93,12 +100,7 @@ impl NodeSink for DiskSink<'_> {
     type Record = NodeRecord;
 
     fn take(&self, node: &NodeDraft) -> Result<NodeRecord> {
-        let child_path: Vec<String> = node.child_path.iter().map(u32::to_string).collect();
-        let file = if child_path.is_empty() {
-            format!("{}.glb", self.prefix)
-        } else {
-            format!("{}-{}.glb", self.prefix, child_path.join("."))
-        };
+        let file = file_name(&self.prefix, node.child_path);
         let id = node_id(&file);
         let baked = node.baked.and_then(|_| {
             self.stages.time(Stage::Bake, || self.textures.bake(node.mesh, node.resolution))
@@ -143,7 +145,6 @@ impl NodeSink for DiskSink<'_> {
                 p95_error: node.error.p95,
                 pictures,
                 shared,
-                level: node.level() as u32,
                 budget: node.budget,
                 step: Some(node.step),
                 baked: node.baked,
@@ -182,6 +183,14 @@ fn over_budget(node: &NodeDraft, triangles: usize) -> Option<String> {
         || triangles as f64 <= (node.budget as f64 * BUDGET_TOLERANCE).ceil()
     {
         return None;
+    }
+    if let Some(Kept { area, skyline, .. }) = node.within_budget {
+        let percent = |share: Option<f64>| 100.0 * share.unwrap_or(1.0);
+        return Some(format!(
+            "within its budget it keeps {:.1} % of the covered ground and {:.1} % of the skyline",
+            percent(area),
+            percent(skyline)
+        ));
     }
     let skirts = skirt::triangles_of(node.skirts);
     Some(if triangles - skirts <= node.budget {

@@ -13,17 +13,20 @@ pub fn make_errors_monotone(tree: &mut Tree<NodeRecord>) -> f64 {
     tree.record.geometric_error
 }
 
-/// Appends the nodes of a block's tree, breadth first, with their links.
+/// Appends the nodes of a tree of a block, breadth first, with their links.
 pub fn append_nodes(
     nodes: &mut Vec<Node>,
     tree: Tree<NodeRecord>,
     block: u32,
     shared_numbers: &BTreeMap<String, u32>,
 ) {
-    let mut level = vec![(None, vec![tree])];
-    while !level.is_empty() {
+    let mut families = vec![(None, vec![tree])];
+    for level in 0.. {
+        if families.is_empty() {
+            break;
+        }
         let mut next = Vec::new();
-        for (parent, siblings) in level {
+        for (parent, siblings) in families {
             let count = siblings.len();
             for (place, Tree { record, children }) in siblings.into_iter().enumerate() {
                 let index = nodes.len() as u32;
@@ -34,34 +37,30 @@ pub fn append_nodes(
                     parent.first_child = Some(index);
                 }
                 let next_sibling = (place + 1 < count).then_some(index + 1);
-                nodes.push(node_of(record, parent, next_sibling, block, shared_numbers));
+                let node = node_of(record, shared_numbers);
+                nodes.push(Node { parent, next_sibling, level, block: Some(block), ..node });
                 if !children.is_empty() {
                     next.push((Some(index), children));
                 }
             }
         }
-        level = next;
+        families = next;
     }
 }
 
-fn node_of(
-    record: NodeRecord,
-    parent: Option<u32>,
-    next_sibling: Option<u32>,
-    block: u32,
-    shared_numbers: &BTreeMap<String, u32>,
-) -> Node {
+/// A node on its own, as if it were a root without children.
+fn node_of(record: NodeRecord, shared_numbers: &BTreeMap<String, u32>) -> Node {
     let mut shared_textures: Vec<u32> =
         record.shared.iter().filter_map(|(name, _)| shared_numbers.get(name).copied()).collect();
     shared_textures.sort_unstable();
     shared_textures.dedup();
     Node {
         id: record.id,
-        parent,
+        parent: None,
         first_child: None,
-        next_sibling,
-        level: record.level,
-        block: Some(block),
+        next_sibling: None,
+        level: 0,
+        block: None,
         triangles: record.attributes.triangles,
         textured_triangles: record.attributes.textured_triangles,
         vertices: record.attributes.vertices,

@@ -135,6 +135,16 @@ impl Original {
         (known && !self.is_empty()).then(|| self.parts.iter().flat_map(of_part))
     }
 
+    /// Corners of its triangles.
+    pub fn triangles(&self) -> impl Iterator<Item = [Vec3; 3]> {
+        self.parts.iter().flat_map(|part| {
+            let Bvh { leaves, counts, .. } = &part.bvh;
+            leaves.iter().zip(counts).flat_map(|(leaf, &count)| {
+                (0..usize::from(count)).map(|lane| leaf.lane(lane).corners())
+            })
+        })
+    }
+
     /// Several surfaces as one. Their triangles are shared, not copied.
     pub fn union(parts: Vec<Arc<Self>>) -> Self {
         let constants = parts.first().map_or_else(Default::default, |part| part.constants);

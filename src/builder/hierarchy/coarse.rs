@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::BlockBuilder;
-use super::node::{NodeDraft, NodeSink};
+use super::node::{Forest, NodeDraft, NodeSink, Tree};
+use super::outline::{LeftOut, SourceOutline};
 use crate::Result;
 use crate::builder::border::cap::cap_sections;
 use crate::builder::border::skirt::{Skirt, skirts, triangles_of};
@@ -19,7 +20,7 @@ use crate::builder::simplify::ladder::{AppearanceWeights, Method, simplify};
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::builder::simplify::weld_seams::weld_seams;
 use crate::builder::stages::Stage;
-use crate::mesh::{Mesh, all_differ};
+use crate::mesh::{Kept, Mesh, all_differ};
 use crate::texture::BakeReason;
 
 /// Where simplification leaves nothing, so many of the largest triangles stay: a chunk must not
@@ -51,6 +52,17 @@ pub(super) struct CoarseNode<'a> {
     pub budget: usize,
 }
 
+/// What a node has come to.
+struct Attempt {
+    coarse: Coarse,
+    /// Why it needs a texture of its own, where it does.
+    reason: Option<BakeReason>,
+    /// Of the source's outline.
+    kept: Kept,
+    /// What it would keep within its budget, where it was given more.
+    within_budget: Option<Kept>,
+}
+
 /// A simplified mesh with its border.
 struct Coarse {
     simplified: Simplified,
@@ -58,67 +70,129 @@ struct Coarse {
     skirts: Vec<Skirt>,
 }
 
+/// How a coarse node ends.
+pub(super) enum Outcome<R> {
+    Written(R),
+    LeftOut(LeftOut),
+}
+
+impl<R> Outcome<R> {
+    /// The node, if it is written, above what became of its children.
+    pub fn above(self, below: impl IntoIterator<Item = Forest<R>>) -> Forest<R> {
+        let mut forest = Forest { trees: Vec::new(), left_out: Vec::new() };
+        for Forest { trees, left_out } in below {
+            forest.trees.extend(trees);
+            forest.left_out.extend(left_out);
+        }
+        match self {
+            Self::Written(record) => {
+                forest.trees = vec![Tree { record, children: forest.trees }];
+            }
+            Self::LeftOut(node) => forest.left_out.push(node),
+        }
+        forest
+    }
+}
+
 impl<S: NodeSink> BlockBuilder<'_, S> {
-    /// Simplifies and writes a node that is not a leaf.
+    /// Simplifies and writes a node that is not a leaf, or leaves it out.
     pub(super) fn coarse_node(
         &self,
         source: NodeSurface,
         node: CoarseNode,
-    ) -> Result<(S::Record, NodeSurface)> {
-        let NodeSurface { mesh, border, spans, original, moved, error: below, baked } = source;
-        let (coarse, reason) = self
-            .stages
-            .time(Stage::Simplify, || self.simplify_or_bake(mesh, border, spans, baked, &node));
+    ) -> Result<(Outcome<S::Record>, NodeSurface)> {
+        let Attempt { coarse, reason, kept, within_budget } = self.attempt(&source, &node);
+        let NodeSurface { original, moved, error: below, .. } = source;
         let Coarse { simplified: Simplified { mesh, border, step, .. }, spans, skirts } = coarse;
         let measured =
             self.stages.time(Stage::Measure, || surface_error(&original, &mesh)).plus(moved);
         let error = measured.at_least(&below);
-        let on_border = |&&planes: &&u64| planes & node.path.bits() != 0;
-        // Of what is written alone: parents take their colours from the original, too.
-        let painted =
-            self.stages.time(Stage::Simplify, || with_face_colors(&mesh, &skirts, &original));
-        let (drawn, skirts) = match &painted {
-            Some((painted, skirts)) => (painted, skirts),
-            None => (&mesh, &skirts),
+        let outcome = if kept.least() < self.options.constants.outline.least_kept {
+            let triangles = (mesh.triangles.len() + triangles_of(&skirts)) as u64;
+            let child_path = node.child_path.to_vec();
+            Outcome::LeftOut(LeftOut { child_path, triangles, kept })
+        } else {
+            let on_border = |&&planes: &&u64| planes & node.path.bits() != 0;
+            // Of what is written alone: parents take their colours from the original, too.
+            let painted =
+                self.stages.time(Stage::Simplify, || with_face_colors(&mesh, &skirts, &original));
+            let (drawn, skirts) = match &painted {
+                Some((painted, skirts)) => (painted, skirts),
+                None => (&mesh, &skirts),
+            };
+            Outcome::Written(self.sink.take(&NodeDraft {
+                mesh: drawn,
+                skirts,
+                resolution: node.resolution,
+                child_path: node.child_path,
+                budget: node.budget,
+                within_budget,
+                error,
+                step,
+                baked: reason,
+                locked: border.planes.iter().filter(on_border).count(),
+            })?)
         };
-        let record = self.sink.take(&NodeDraft {
-            mesh: drawn,
-            skirts,
-            resolution: node.resolution,
-            child_path: node.child_path,
-            budget: node.budget,
-            error,
-            step,
-            baked: reason,
-            locked: border.planes.iter().filter(on_border).count(),
-        })?;
         let baked = reason.is_some();
-        Ok((record, NodeSurface { mesh, border, spans, original, moved, error, baked }))
+        Ok((outcome, NodeSurface { mesh, border, spans, original, moved, error, baked }))
+    }
+
+    /// Simplifies a node, and again with more and more triangles where it keeps too little of the
+    /// source's outline.
+    fn attempt(&self, source: &NodeSurface, node: &CoarseNode) -> Attempt {
+        let constants = &self.options.constants.outline;
+        let simplified = |node: &CoarseNode| {
+            self.stages.time(Stage::Simplify, || self.simplify_or_bake(source, node))
+        };
+        let outline = self
+            .stages
+            .time(Stage::Measure, || SourceOutline::of(&source.original, self.up, constants));
+        let kept_by = |coarse: &Coarse| {
+            let mesh = &coarse.simplified.mesh;
+            let kept = || outline.as_ref().map_or_else(Kept::default, |o| o.kept_by(mesh));
+            self.stages.time(Stage::Measure, kept)
+        };
+        let (mut coarse, mut reason) = simplified(node);
+        let mut kept = kept_by(&coarse);
+        let mut within_budget = None;
+        let mut budget = node.budget as f64;
+        let most = budget * self.resolutions.step(node.resolution) * constants.most_triangles;
+        while kept.least() < constants.least_kept {
+            budget *= constants.more_triangles;
+            if budget > most {
+                break;
+            }
+            within_budget = within_budget.or(Some(kept));
+            (coarse, reason) = simplified(&CoarseNode { budget: budget as usize, ..*node });
+            kept = kept_by(&coarse);
+        }
+        Attempt { coarse, reason, kept, within_budget }
     }
 
     /// Simplifies within texture seams where these leave enough, else without them: the node then
     /// needs a texture of its own, for the reason that is returned.
     fn simplify_or_bake(
         &self,
-        mut mesh: Mesh,
-        mut border: Border,
-        spans: Vec<BorderSpan>,
-        baked_below: bool,
+        source: &NodeSurface,
         node: &CoarseNode,
     ) -> (Coarse, Option<BakeReason>) {
-        let Some(plan) = self.bake else {
-            return (self.simplified(&mesh, border, spans, node, false), None);
+        let NodeSurface { mesh, border, spans, .. } = source;
+        let simplified = |mesh: &Mesh, border: Border, is_baked: bool| {
+            self.simplified(mesh, border, spans.clone(), node, is_baked)
         };
-        let mut reason = plan.always.or(baked_below.then_some(BakeReason::Below));
+        let Some(plan) = self.bake else {
+            return (simplified(mesh, border.clone(), false), None);
+        };
+        let mut reason = plan.always.or(source.baked.then_some(BakeReason::Below));
         if reason.is_none() {
-            let coarse = self.simplified(&mesh, border.clone(), spans.clone(), node, false);
+            let coarse = simplified(mesh, border.clone(), false);
             if coarse.simplified.step == LadderStep::Collapse {
                 return (coarse, None);
             }
             reason = Some(BakeReason::Seams);
         }
-        (mesh, border) = weld_seams(&mesh, &border, plan.classes);
-        (self.simplified(&mesh, border, spans, node, true), reason)
+        let (mesh, border) = weld_seams(mesh, border, plan.classes);
+        (simplified(&mesh, border, true), reason)
     }
 
     /// The ladder's result with its border thinned, its sections capped and its skirts.

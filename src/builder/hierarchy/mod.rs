@@ -8,6 +8,7 @@ mod coarse;
 mod divide;
 pub mod node;
 pub mod options;
+mod outline;
 pub mod shape;
 
 use std::borrow::Cow;
@@ -15,8 +16,9 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-pub use self::node::{NodeDraft, NodeSink, Tree};
+pub use self::node::{Forest, NodeDraft, NodeSink, Tree};
 pub use self::options::{BorderMode, HierarchyOptions, SimplifyFrom, TreeShape};
+pub use self::outline::LeftOut;
 pub use self::shape::Resolutions;
 
 use self::coarse::{CoarseNode, NodeSurface};
@@ -62,18 +64,18 @@ pub struct BlockBuilder<'a, S> {
     pub stages: &'a Stages,
 }
 
-/// A subtree, and what its parent is simplified from.
+/// A subtree, or several where its root is left out, and what its parent is simplified from.
 struct Built<R> {
-    tree: Tree<R>,
+    forest: Forest<R>,
     /// `None` below a node that is simplified from the original.
     surface: Option<NodeSurface>,
 }
 
 impl<S: NodeSink> BlockBuilder<'_, S> {
-    /// Builds the whole tree over a block.
-    pub fn build(&self, block: Chunk) -> Result<Tree<S::Record>> {
+    /// Builds all nodes of a block.
+    pub fn build(&self, block: Chunk) -> Result<Forest<S::Record>> {
         let plan = self.resolutions.root(block.mesh.triangles.len());
-        Ok(self.subtree(block, plan, &[], false)?.tree)
+        Ok(self.subtree(block, plan, &[], false)?.forest)
     }
 
     /// What counts as a body in any node of the block.
@@ -128,17 +130,17 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             };
             let (coarse, built) =
                 rayon::join(from_original, || self.children(children, child_path, parallel, false));
-            let ((record, surface), built) = (coarse?, built?);
-            let children = built.into_iter().map(|built| built.tree).collect();
-            return Ok(Built { tree: Tree { record, children }, surface: Some(surface) });
+            let ((outcome, surface), built) = (coarse?, built?);
+            let below = built.into_iter().map(|built| built.forest);
+            return Ok(Built { forest: outcome.above(below), surface: Some(surface) });
         }
         drop((mesh, border, stitches));
         let built = self.children(children, child_path, parallel, true)?;
-        let (trees, surfaces): (Vec<_>, Vec<_>) =
-            built.into_iter().map(|built| (built.tree, built.surface)).unzip();
+        let (below, surfaces): (Vec<_>, Vec<_>) =
+            built.into_iter().map(|built| (built.forest, built.surface)).unzip();
         let source = join(surfaces.into_iter().flatten().collect(), path.len());
-        let (record, surface) = self.coarse_node(source, node)?;
-        Ok(Built { tree: Tree { record, children: trees }, surface: Some(surface) })
+        let (outcome, surface) = self.coarse_node(source, node)?;
+        Ok(Built { forest: outcome.above(below), surface: Some(surface) })
     }
 
     fn children(
@@ -170,6 +172,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             resolution,
             child_path,
             budget: triangles,
+            within_budget: None,
             error: SurfaceError::default().plus(moved),
             step: LadderStep::Original,
             baked: None,
@@ -181,7 +184,8 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             let node = CoarseNode { path: &path, resolution, child_path, budget: triangles };
             self.original(chunk.mesh, chunk.border, chunk.stitches, moved, &node)
         });
-        Ok(Built { tree: Tree { record, children: Vec::new() }, surface })
+        let trees = vec![Tree { record, children: Vec::new() }];
+        Ok(Built { forest: Forest { trees, left_out: Vec::new() }, surface })
     }
 
     /// A chunk of the original, with its stitches, as what a node is simplified from; errors are

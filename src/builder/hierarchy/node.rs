@@ -1,10 +1,11 @@
 //! Finished nodes and where they go.
 
+use super::outline::LeftOut;
 use crate::Result;
 use crate::builder::border::skirt::Skirt;
 use crate::builder::error::SurfaceError;
 use crate::builder::simplify::simplified::LadderStep;
-use crate::mesh::Mesh;
+use crate::mesh::{Kept, Mesh};
 use crate::texture::BakeReason;
 
 /// A finished node, on its way to disk.
@@ -19,8 +20,11 @@ pub struct NodeDraft<'a> {
     pub resolution: usize,
     /// Child numbers from the root down; empty for the root.
     pub child_path: &'a [u32],
-    /// The triangles that it may have.
+    /// The triangles that it should have at most.
     pub budget: usize,
+    /// What it would keep of its source's outline within its budget, where that is too little and it
+    /// was given more ([`OutlineConstants`](crate::builder::constants::OutlineConstants)).
+    pub within_budget: Option<Kept>,
     /// Distance from the original; 0 for leaves, where they are not quantised.
     pub error: SurfaceError,
     /// How it was made.
@@ -32,7 +36,7 @@ pub struct NodeDraft<'a> {
 }
 
 impl NodeDraft<'_> {
-    /// Steps from its block's root.
+    /// How often its block was divided above it: its level, unless a node above is left out.
     pub fn level(&self) -> usize {
         self.child_path.len()
     }
@@ -48,6 +52,15 @@ pub trait NodeSink: Sync {
 
     /// Called when chunks holding this many source triangles have become leaves.
     fn leaves_done(&self, _triangles: usize) {}
+}
+
+/// What becomes of a block: a tree, or where coarse nodes are left out, several.
+#[derive(Debug)]
+pub struct Forest<R> {
+    /// In the order in which they were cut off.
+    pub trees: Vec<Tree<R>>,
+    /// Those above them, and others between them, that were not written; children first.
+    pub left_out: Vec<LeftOut>,
 }
 
 /// A node's record and its children.

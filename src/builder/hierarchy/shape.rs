@@ -77,6 +77,11 @@ impl Resolutions {
         &self.factors
     }
 
+    /// How many times the triangles of a coarse node its children have.
+    pub fn step(&self, resolution: usize) -> f64 {
+        self.factors.get(resolution + 1).map_or(1.0, |next| self.factors[resolution] / next)
+    }
+
     /// The resolution of leaves.
     pub fn last(&self) -> usize {
         self.factors.len() - 1

@@ -1,0 +1,47 @@
+//! What a coarse node keeps of the outline of its source, and what becomes of one that keeps too
+//! little.
+
+use serde::{Deserialize, Serialize};
+
+use crate::builder::constants::OutlineConstants;
+use crate::builder::error::Original;
+use crate::mesh::{Kept, Mesh, Outline, OutlineFrame, UpAxis};
+
+/// A coarse node that is not written, since it would keep too little of the outline of its source:
+/// the nodes below it stand in its place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// Child numbers from the root of its block down.
+    pub child_path: Vec<u32>,
+    /// The triangles that it would have had.
+    pub triangles: u64,
+    /// What it would have kept with these.
+    pub kept: Kept,
+}
+
+/// The outline of what a node stands for.
+pub(super) struct SourceOutline {
+    frame: OutlineFrame,
+    outline: Outline,
+}
+
+impl SourceOutline {
+    /// `None` where there is none, or nobody asks for it.
+    pub fn of(original: &Original, up: UpAxis, constants: &OutlineConstants) -> Option<Self> {
+        if constants.least_kept <= 0.0 {
+            return None;
+        }
+        let corners = || original.triangles().map(|corners| corners.map(|p| p.as_dvec3()));
+        let frame = OutlineFrame::around(up, corners().flatten(), constants.cells)?;
+        let outline = frame.empty();
+        corners().for_each(|corners| frame.add(&outline, corners));
+        Some(Self { frame, outline })
+    }
+
+    /// What a simplified mesh keeps of it.
+    pub fn kept_by(&self, mesh: &Mesh) -> Kept {
+        let outline = self.frame.empty();
+        mesh.triangles.iter().for_each(|&t| self.frame.add(&outline, mesh.corners(t)));
+        self.outline.kept_by(&outline)
+    }
+}

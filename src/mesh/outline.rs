@@ -1,0 +1,402 @@
+//! What a simplified mesh keeps of the outline of its source: the ground that it covers, seen from
+//! above, and the skyline that it makes, seen from all sides.
+//!
+//! Distances tell little of either: a tower that is gone is one point of a large error, and a
+//! thousand sheds that are gone are none.
+
+use std::f64::consts::PI;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+use super::UpAxis;
+
+/// Skylines, evenly over half a turn: from the other side each is the same.
+const SIDES: usize = 8;
+
+/// The ground and the heights that outlines are compared on: that of a source.
+pub struct OutlineFrame {
+    up: UpAxis,
+    /// The corner of the ground, and the height of its lowest point.
+    low: DVec3,
+    /// Cells a metre.
+    per_metre: f64,
+    cells: [usize; 2],
+    /// Of a skyline.
+    columns: usize,
+    sides: [Side; SIDES],
+}
+
+/// Where a skyline runs.
+struct Side {
+    /// Its direction, columns a metre.
+    axis: DVec2,
+    /// Where it begins, in columns.
+    first: f64,
+}
+
+/// What triangles cover, and how high they rise. They may be added by many threads at once.
+pub struct Outline {
+    /// A bit for each cell whose centre is below or above a triangle, row by row.
+    covered: Vec<AtomicU64>,
+    /// Of each column of each side, the highest point above the frame's lowest as bits, which are in
+    /// the order of the numbers as none is below 0; `EMPTY` where nothing is.
+    top: Vec<AtomicU64>,
+    /// Likewise the lowest, as the largest number less it, so that both are found by `max`.
+    bottom: Vec<AtomicU64>,
+    /// Of each side.
+    columns: usize,
+    /// Of the columns of each side, metres.
+    widths: [f64; SIDES],
+}
+
+/// What is kept of the ground that a source covers, seen from above, and of its skylines, seen from
+/// sixteen sides: shares of the source, 0–1. `None` where the source covers nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Kept {
+    /// Of the covered ground, what is covered still.
+    pub area: Option<f64>,
+    /// What is covered besides, over the area of the source; may exceed 1.
+    pub area_added: Option<f64>,
+    /// Of the area between each column's lowest point and the skyline, what is below the simplified
+    /// skyline still. A column is at least as high as it is wide, so that flat ground is not judged
+    /// by its bumps.
+    pub skyline: Option<f64>,
+    /// How far the simplified skyline is above the source's, over the same area; may exceed 1.
+    pub skyline_added: Option<f64>,
+}
+
+const EMPTY: u64 = 0;
+
+impl OutlineFrame {
+    /// Around these positions, with so many cells along the longer side of the ground, and as many
+    /// columns in each skyline; `None` where they cover no ground.
+    pub fn around(
+        up: UpAxis,
+        positions: impl IntoIterator<Item = DVec3>,
+        cells: usize,
+    ) -> Option<Self> {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for position in positions {
+            let position = up.z_up(position);
+            (low, high) = (low.min(position), high.max(position));
+        }
+        let size = (high - low).truncate();
+        if !((high - low).is_finite() && size.max_element() > 0.0) {
+            return None;
+        }
+        let columns = cells;
+        let per_metre = cells as f64 / size.max_element();
+        let cells = [size.x, size.y].map(|side| ((side * per_metre).ceil() as usize).max(1));
+        let sides = std::array::from_fn(|side| {
+            // libm's, which is alike on all machines.
+            let (sin, cos) = libm::sincos(PI * side as f64 / SIDES as f64);
+            let axis = DVec2::new(cos, sin);
+            let corners =
+                [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(|at| (at * size).dot(axis));
+            let first = corners.into_iter().fold(f64::INFINITY, f64::min);
+            let last = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
+            let per_metre = columns as f64 / (last - first).max(f64::MIN_POSITIVE);
+            Side { axis: axis * per_metre, first: first * per_metre }
+        });
+        Some(Self { up, low, per_metre, cells, columns, sides })
+    }
+
+    /// An outline of nothing.
+    pub fn empty(&self) -> Outline {
+        let none = |count: usize| (0..count).map(|_| AtomicU64::new(EMPTY)).collect();
+        Outline {
+            covered: none((self.cells[0] * self.cells[1]).div_ceil(64)),
+            top: none(SIDES * self.columns),
+            bottom: none(SIDES * self.columns),
+            columns: self.columns,
+            widths: self.sides.each_ref().map(|side| 1.0 / side.axis.length()),
+        }
+    }
+
+    /// Adds a triangle to an outline of this frame.
+    pub fn add(&self, outline: &Outline, corners: [DVec3; 3]) {
+        let corners = corners.map(|corner| self.up.z_up(corner) - self.low);
+        self.cover(&outline.covered, corners);
+        for (side, &Side { axis, first }) in self.sides.iter().enumerate() {
+            let columns = side * self.columns..(side + 1) * self.columns;
+            let (top, bottom) = (&outline.top[columns.clone()], &outline.bottom[columns]);
+            let along = corners.map(|corner| corner.truncate().dot(axis) - first);
+            let columns = along.map(|along| centre(along, self.columns));
+            if columns[0] == columns[1] && columns[1] == columns[2] {
+                continue;
+            }
+            for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+                let columns = columns[from].min(columns[to])..columns[from].max(columns[to]);
+                let end = |i: usize| DVec2::new(along[i], corners[i].z.max(0.0));
+                rise(top, bottom, [end(from), end(to)], columns);
+            }
+        }
+    }
+
+    /// Marks the cells whose centres a triangle covers.
+    fn cover(&self, covered: &[AtomicU64], corners: [DVec3; 3]) {
+        let corners = corners.map(|corner| DVec2::new(corner.y, corner.x) * self.per_metre);
+        for row in centres(corners.map(|corner| corner.x), self.cells[1]) {
+            let Some([from, to]) = across(corners, row as f64 + 0.5) else { continue };
+            for column in centres([from, to], self.cells[0]) {
+                let bit = row * self.cells[0] + column;
+                let word = &covered[bit / 64];
+                let mask = 1 << (bit % 64);
+                // Most are there already, and reading is cheaper.
+                if word.load(Ordering::Relaxed) & mask == 0 {
+                    word.fetch_or(mask, Ordering::Relaxed);
+                }
+            }
+        }
+    }
+}
+
+/// Raises and lowers the columns of a skyline at whose centres an edge is there: no triangle is
+/// higher or lower than its edges.
+fn rise(top: &[AtomicU64], bottom: &[AtomicU64], [from, to]: [DVec2; 2], columns: Range<usize>) {
+    if columns.is_empty() {
+        return;
+    }
+    let slope = (to.y - from.y) / (to.x - from.x);
+    let (low, high) = (from.y.min(to.y), from.y.max(to.y));
+    for column in columns {
+        let height = (from.y + (column as f64 + 0.5 - from.x) * slope).clamp(low, high);
+        raise(&top[column], height.max(f64::MIN_POSITIVE).to_bits());
+        raise(&bottom[column], u64::MAX - height.to_bits());
+    }
+}
+
+/// The largest that was ever there.
+fn raise(most: &AtomicU64, to: u64) {
+    // Most are lower, and reading is cheaper.
+    if most.load(Ordering::Relaxed) < to {
+        most.fetch_max(to, Ordering::Relaxed);
+    }
+}
+
+/// The first cell, of so many, whose centre is above a coordinate in cells.
+fn centre(coordinate: f64, count: usize) -> usize {
+    // The cast rounds towards 0.
+    ((coordinate + 0.5) as i32).clamp(0, count as i32) as usize
+}
+
+/// The cells, of so many, whose centres lie above the least of some coordinates, in cells, and not
+/// above the largest.
+fn centres(coordinates: impl IntoIterator<Item = f64>, count: usize) -> Range<usize> {
+    coordinates
+        .into_iter()
+        .map(|coordinate| centre(coordinate, count))
+        .fold(count..0, |range, at| range.start.min(at)..range.end.max(at))
+}
+
+/// Where a line of equal first coordinate crosses a triangle: the least and largest second one.
+fn across(corners: [DVec2; 3], at: f64) -> Option<[f64; 2]> {
+    let [a, b, c] = corners;
+    let crossing = |[from, to]: [DVec2; 2]| {
+        let is_across = (from.x < at) != (to.x < at);
+        is_across.then(|| from.y + (to.y - from.y) * ((at - from.x) / (to.x - from.x)))
+    };
+    let crossings = [[a, b], [b, c], [c, a]].into_iter().filter_map(crossing);
+    crossings.fold(None, |range, y| match range {
+        None => Some([y, y]),
+        Some([low, high]) => Some([low.min(y), high.max(y)]),
+    })
+}
+
+impl Outline {
+    /// What of the ground and of the skyline of `self` another outline of the same frame has, and
+    /// what it adds.
+    pub fn kept_by(&self, other: &Self) -> Kept {
+        let words = self.covered.iter().zip(&other.covered);
+        let words = words.map(|(own, others)| [own, others].map(|w| w.load(Ordering::Relaxed)));
+        let (mut area, mut both, mut more) = (0u64, 0u64, 0u64);
+        for [own, others] in words {
+            area += u64::from(own.count_ones());
+            both += u64::from((own & others).count_ones());
+            more += u64::from((others & !own).count_ones());
+        }
+        let (mut height, mut lost, mut added) = (0.0, 0.0, 0.0);
+        for column in 0..self.top.len() {
+            let of = |bits: &AtomicU64| bits.load(Ordering::Relaxed);
+            let (own, others) = (of(&self.top[column]), of(&other.top[column]));
+            if own == EMPTY {
+                continue;
+            }
+            let bottom = f64::from_bits(u64::MAX - of(&self.bottom[column]));
+            let rises = |top: u64| (f64::from_bits(top) - bottom).max(0.0);
+            let (own, others) = (rises(own), rises(others));
+            height += own.max(self.widths[column / self.columns]);
+            lost += (own - others).max(0.0);
+            added += (others - own).max(0.0);
+        }
+        let share = |part: f64, of: f64| (of > 0.0).then(|| part / of);
+        Kept {
+            area: share(both as f64, area as f64),
+            area_added: share(more as f64, area as f64),
+            skyline: share(height - lost, height),
+            skyline_added: share(added, height),
+        }
+    }
+}
+
+impl Kept {
+    /// The smaller share of the ground and of the skyline; 1 where there is neither.
+    pub fn least(&self) -> f64 {
+        self.area.unwrap_or(1.0).min(self.skyline.unwrap_or(1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    const CELLS: usize = 4096;
+
+    /// Upright boxes: corner, size.
+    fn boxes(boxes: &[[DVec3; 2]]) -> Vec<[DVec3; 3]> {
+        let mut triangles = Vec::new();
+        for &[low, size] in boxes {
+            let corner = |at: u32| {
+                let at = DVec3::new(f64::from(at & 1), f64::from(at >> 1 & 1), f64::from(at >> 2));
+                low + at * size
+            };
+            let faces = [
+                [0, 1, 3, 2],
+                [4, 5, 7, 6],
+                [0, 1, 5, 4],
+                [2, 3, 7, 6],
+                [0, 2, 6, 4],
+                [1, 3, 7, 5],
+            ];
+            for [a, b, c, d] in faces.map(|face| face.map(corner)) {
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+        triangles
+    }
+
+    fn kept_of(up: UpAxis, source: &[[DVec3; 3]], level: &[[DVec3; 3]]) -> Kept {
+        let corners = source.iter().flatten().copied();
+        let frame = OutlineFrame::around(up, corners, CELLS).unwrap();
+        let [source, level] = [source, level].map(|triangles| {
+            let outline = frame.empty();
+            triangles.iter().for_each(|&corners| frame.add(&outline, corners));
+            outline
+        });
+        source.kept_by(&level)
+    }
+
+    fn kept(source: &[[DVec3; 2]], level: &[[DVec3; 2]]) -> Kept {
+        kept_of(UpAxis::Z, &boxes(source), &boxes(level))
+    }
+
+    /// A row of houses as high as they are wide, on slabs that keep the ground where it is.
+    fn houses(random: &mut Random) -> Vec<[DVec3; 2]> {
+        let house = |n: usize| {
+            let size = DVec3::new(
+                random.between(4.0, 9.0),
+                random.between(4.0, 9.0),
+                random.between(3.0, 30.0),
+            );
+            let low = DVec3::new(n as f64 * 10.0, random.between(0.0, 50.0), 0.0);
+            [low, size]
+        };
+        (0..12).map(house).collect()
+    }
+
+    #[test]
+    fn what_is_the_same_is_kept_whole() {
+        let all = houses(&mut Random::new(1, 0));
+        let whole = Kept {
+            area: Some(1.0),
+            area_added: Some(0.0),
+            skyline: Some(1.0),
+            skyline_added: Some(0.0),
+        };
+        assert_eq!(kept(&all, &all), whole);
+    }
+
+    /// Areas are sums of rectangles, and a box's skyline is a rectangle of its own: naive sums, over
+    /// columns of another width.
+    #[test]
+    fn houses_that_go_or_grow_are_missed_by_their_own_area_and_skyline() {
+        for seed in 0..4 {
+            let mut random = Random::new(seed, 1);
+            let all = houses(&mut random);
+            let mut level: Vec<[DVec3; 2]> = all.iter().copied().step_by(2).collect();
+            level[2][1].z *= 2.0;
+            level[3][1].z *= 0.5;
+            let found = kept(&all, &level);
+
+            let area =
+                |boxes: &[[DVec3; 2]]| boxes.iter().map(|[_, size]| size.x * size.y).sum::<f64>();
+            let expected = area(&level) / area(&all);
+            assert!((found.area.unwrap() - expected).abs() < 1e-3, "{seed}: {found:?} {expected}");
+            assert!(found.area_added.unwrap() < 1e-3);
+
+            let (mut height, mut both, mut more) = (0.0, 0.0, 0.0);
+            for side in 0..8 {
+                let angle = PI / 8.0 * f64::from(side);
+                let top = |boxes: &[[DVec3; 2]], at: f64| {
+                    let over = boxes.iter().filter(|[low, size]| {
+                        let middle = *low + *size * 0.5;
+                        let off = middle.x * angle.cos() + middle.y * angle.sin() - at;
+                        off.abs() < 0.5 * (size.x * angle.cos().abs() + size.y * angle.sin())
+                    });
+                    over.map(|[_, size]| size.z).fold(0.0, f64::max)
+                };
+                // Columns of a skyline are as many, however wide it is: so is each step here.
+                let corners = |[low, size]: &[DVec3; 2]| [*low, *low + *size];
+                let (low, high) = all
+                    .iter()
+                    .flat_map(corners)
+                    .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), corner| {
+                        (low.min(corner), high.max(corner))
+                    });
+                let ends = [low.x, high.x]
+                    .into_iter()
+                    .flat_map(|x| [low.y, high.y].map(|y| x * angle.cos() + y * angle.sin()));
+                let ends: Vec<f64> = ends.collect();
+                let first = ends.iter().copied().fold(f64::INFINITY, f64::min);
+                let last = ends.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                for step in 0..20_000 {
+                    let at = first + (last - first) * (f64::from(step) + 0.5) / 20_000.0;
+                    let (own, others) = (top(&all, at), top(&level, at));
+                    height += own;
+                    both += own.min(others);
+                    more += (others - own).max(0.0);
+                }
+            }
+            let (skyline, added) = (found.skyline.unwrap(), found.skyline_added.unwrap());
+            assert!((skyline - both / height).abs() < 2e-3, "{seed}: {skyline} {}", both / height);
+            assert!((added - more / height).abs() < 2e-3, "{seed}: {added} {}", more / height);
+            assert!(skyline < 0.9 && added > 0.0, "the case tells: {skyline} {added}");
+        }
+    }
+
+    #[test]
+    fn whichever_axis_is_up() {
+        let all = boxes(&houses(&mut Random::new(3, 2)));
+        let turned = |triangles: &[[DVec3; 3]]| -> Vec<[DVec3; 3]> {
+            triangles.iter().map(|corners| corners.map(|p| UpAxis::Y.from_z_up(p))).collect()
+        };
+        let few = &all[..48];
+        let upright = kept_of(UpAxis::Z, &all, few);
+        assert!(upright.area.unwrap() < 0.5);
+        assert_eq!(kept_of(UpAxis::Y, &turned(&all), &turned(few)), upright);
+    }
+
+    #[test]
+    fn what_has_no_ground_has_no_shares() {
+        let upright = [DVec3::ZERO, DVec3::new(0.0, 0.0, 5.0)];
+        assert!(OutlineFrame::around(UpAxis::Z, upright, CELLS).is_none());
+        assert!(OutlineFrame::around(UpAxis::Z, [DVec3::NAN, DVec3::ONE], CELLS).is_none());
+        let wall = [[DVec3::ZERO, DVec3::new(9.0, 0.0, 0.0), DVec3::new(9.0, 0.0, 4.0)]];
+        let kept = kept_of(UpAxis::Z, &wall, &wall);
+        assert_eq!((kept.area, kept.skyline), (None, Some(1.0)));
+    }
+}
