@@ -1,14 +1,16 @@
 //! What can be asked of a run.
 
+use std::fmt;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use hlod::bench::{BenchOptions, Pace, Session, Size};
 use hlod::runtime::lakhia::{LakhiaOptions, ShareFeedback, StartOfHysteresis};
 use hlod::runtime::residency::ResidencyOptions;
 
-/// What a frame may take unless that is said.
-const TARGET_MS: f64 = 30.0;
+const LAKHIA: LakhiaOptions = LakhiaOptions::DEFAULT;
+const RESIDENCY: ResidencyOptions = ResidencyOptions::DEFAULT;
 
 /// A scene, a path, and all that determines a run.
 #[derive(Args, Clone, Debug)]
@@ -43,24 +45,24 @@ pub struct RunArgs {
     #[arg(long, value_name = "MS", help_heading = "Selection")]
     pub target_ms: Option<f64>,
     /// c_vis: weight of visibility in a node's benefit, 0 or more
-    #[arg(long, value_name = "C", default_value_t = 1.275, help_heading = "Selection")]
+    #[arg(long, value_name = "C", default_value_t = LAKHIA.vis, help_heading = "Selection")]
     pub vis: f64,
     /// c_fore: weight of foreshortening in a node's benefit, 0-1
-    #[arg(long, value_name = "C", default_value_t = 0.45, help_heading = "Selection")]
+    #[arg(long, value_name = "C", default_value_t = LAKHIA.fore, help_heading = "Selection")]
     pub fore: f64,
     /// c_hystSwitch: value at which a hysteresis counter takes effect, above 0. More: fewer and
     /// later toggles
-    #[arg(long, value_name = "C", default_value_t = 1500.0, help_heading = "Selection")]
+    #[arg(long, value_name = "C", default_value_t = LAKHIA.hyst_switch, help_heading = "Selection")]
     pub hyst_switch: f64,
     /// c_hystLimit: largest magnitude of a hysteresis counter, --hyst-switch or more
-    #[arg(long, value_name = "C", default_value_t = 4510.0, help_heading = "Selection")]
+    #[arg(long, value_name = "C", default_value_t = LAKHIA.hyst_limit, help_heading = "Selection")]
     pub hyst_limit: f64,
     /// Where hysteresis counters start: `affordable` draws nodes at once only where their time
     /// slice suffices
-    #[arg(long, value_enum, default_value_t = StartOfHysteresis::Affordable, help_heading = "Selection")]
+    #[arg(long, value_enum, default_value_t = LAKHIA.hyst_start, help_heading = "Selection")]
     pub hyst_start: StartOfHysteresis,
     /// Seconds by which the camera is extrapolated before distances are measured, 0 or more
-    #[arg(long, value_name = "S", default_value_t = 0.5, help_heading = "Selection")]
+    #[arg(long, value_name = "S", default_value_t = LAKHIA.lookahead_s, help_heading = "Selection")]
     pub lookahead: f64,
     /// Least distance of a node in metres, above 0; nearer ones count as this far [default: 1, less
     /// in scenes below 100 m]
@@ -70,36 +72,36 @@ pub struct RunArgs {
     #[arg(long, help_heading = "Selection")]
     pub all_siblings: bool,
     /// Gain of the feedback on v_time, the time of a unit of cost, 0-1; 0 turns it off
-    #[arg(long, value_name = "PART", default_value_t = 0.1, help_heading = "Selection")]
+    #[arg(long, value_name = "PART", default_value_t = LAKHIA.v_time_gain, help_heading = "Selection")]
     pub v_time_gain: f64,
     /// Gain of the feedback on shareTime, the time that is divided among the nodes, 0-1; 0 turns
     /// it off
-    #[arg(long, value_name = "PART", default_value_t = 0.01, help_heading = "Selection")]
+    #[arg(long, value_name = "PART", default_value_t = LAKHIA.share_gain, help_heading = "Selection")]
     pub share_gain: f64,
     /// Fraction of the target by which frames must miss it before shareTime changes, 0 or more
-    #[arg(long, value_name = "PART", default_value_t = 0.05, help_heading = "Selection")]
+    #[arg(long, value_name = "PART", default_value_t = LAKHIA.share_slack, help_heading = "Selection")]
     pub share_slack: f64,
     /// Largest shareTime, as a multiple of the time that the target leaves for nodes, 1 or more.
     /// More: finer where little is in view, but later back on target when more comes into view
-    #[arg(long, value_name = "TIMES", default_value_t = 10.0, help_heading = "Selection")]
+    #[arg(long, value_name = "TIMES", default_value_t = LAKHIA.share_limit, help_heading = "Selection")]
     pub share_limit: f64,
     /// Feedback on shareTime: `plain`, the thesis's, which oscillates; `damped` waits for pending
     /// changes
-    #[arg(long, value_enum, default_value_t = ShareFeedback::Damped, help_heading = "Selection")]
+    #[arg(long, value_enum, default_value_t = LAKHIA.share_feedback, help_heading = "Selection")]
     pub share_feedback: ShareFeedback,
 
     /// maxMemory: memory cap in bytes, loads in progress included; with KiB, MiB or GiB
-    #[arg(long, value_name = "BYTES", default_value = "1GiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
-    pub max_memory: u64,
+    #[arg(long, value_name = "BYTES", default_value_t = Bytes(RESIDENCY.max_memory_bytes), help_heading = "Memory and loading")]
+    pub max_memory: Bytes,
     /// Chunk of a file that is read before the most important node is determined again, in bytes
-    #[arg(long, value_name = "BYTES", default_value = "64KiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
-    pub chunk: u64,
+    #[arg(long, value_name = "BYTES", default_value_t = Bytes(RESIDENCY.chunk_bytes), help_heading = "Memory and loading")]
+    pub chunk: Bytes,
     /// Upload limit of a frame in bytes; one node is always uploaded
-    #[arg(long, value_name = "BYTES", default_value = "4MiB", value_parser = parse_bytes, help_heading = "Memory and loading")]
-    pub upload: u64,
+    #[arg(long, value_name = "BYTES", default_value_t = Bytes(RESIDENCY.upload_bytes), help_heading = "Memory and loading")]
+    pub upload: Bytes,
     /// Fraction by which a node's priority must be higher than that of the nodes that are evicted
     /// for it, 0 or more
-    #[arg(long, value_name = "PART", default_value_t = 0.1, help_heading = "Memory and loading")]
+    #[arg(long, value_name = "PART", default_value_t = RESIDENCY.evict_margin, help_heading = "Memory and loading")]
     pub evict_margin: f64,
 
     /// Width and height of the image, 1-16384 each, in pixels
@@ -147,19 +149,38 @@ pub enum ShadingArg {
 }
 
 /// A number of bytes, with or without KiB, MiB or GiB.
-fn parse_bytes(text: &str) -> Result<u64, String> {
-    let units = [("KiB", 10), ("MiB", 20), ("GiB", 30), ("K", 10), ("M", 20), ("G", 30), ("B", 0)];
-    let (number, shift) = units
-        .iter()
-        .find_map(|&(unit, shift)| text.strip_suffix(unit).map(|number| (number, shift)))
-        .unwrap_or((text, 0));
-    let wanted = "expected bytes such as 1048576, 512MiB or 1.5GiB";
-    let number: f64 = number.trim().parse().map_err(|_| wanted.to_owned())?;
-    let bytes = number * f64::from(1u32 << shift);
-    if bytes.is_finite() && (0.0..=1e18).contains(&bytes) {
-        Ok(bytes as u64)
-    } else {
-        Err(wanted.to_owned())
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bytes(pub u64);
+
+impl fmt::Display for Bytes {
+    /// In the largest unit of which it is a whole number.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let units = [("GiB", 30), ("MiB", 20), ("KiB", 10)];
+        match units.iter().find(|(_, shift)| self.0 > 0 && self.0.is_multiple_of(1 << shift)) {
+            Some((unit, shift)) => write!(f, "{}{unit}", self.0 >> shift),
+            None => write!(f, "{}", self.0),
+        }
+    }
+}
+
+impl FromStr for Bytes {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let units =
+            [("KiB", 10), ("MiB", 20), ("GiB", 30), ("K", 10), ("M", 20), ("G", 30), ("B", 0)];
+        let (number, shift) = units
+            .iter()
+            .find_map(|&(unit, shift)| text.strip_suffix(unit).map(|number| (number, shift)))
+            .unwrap_or((text, 0));
+        let wanted = "expected bytes such as 1048576, 512MiB or 1.5GiB";
+        let number: f64 = number.trim().parse().map_err(|_| wanted.to_owned())?;
+        let bytes = number * f64::from(1u32 << shift);
+        if bytes.is_finite() && (0.0..=1e18).contains(&bytes) {
+            Ok(Self(bytes as u64))
+        } else {
+            Err(wanted.to_owned())
+        }
     }
 }
 
@@ -185,7 +206,7 @@ impl RunArgs {
         let least = (session.tree().diagonal() / 100.0).clamp(1e-6, 1.0);
         BenchOptions {
             selection: LakhiaOptions {
-                target_ms: self.target_ms.unwrap_or(TARGET_MS),
+                target_ms: self.target_ms.unwrap_or(LAKHIA.target_ms),
                 vis: self.vis,
                 fore: self.fore,
                 hyst_switch: self.hyst_switch,
@@ -202,9 +223,9 @@ impl RunArgs {
                 ..LakhiaOptions::default()
             },
             residency: ResidencyOptions {
-                max_memory_bytes: self.max_memory,
-                chunk_bytes: self.chunk,
-                upload_bytes: self.upload,
+                max_memory_bytes: self.max_memory.0,
+                chunk_bytes: self.chunk.0,
+                upload_bytes: self.upload.0,
                 evict_margin: self.evict_margin,
             },
             pace: self.pace,

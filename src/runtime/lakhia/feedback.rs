@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn a_frame_without_nodes_tells_the_overhead_and_nothing_of_costs() {
         let (options, mut feedback) = (options(), Feedback::new(&options()));
-        for _ in 0..200 {
+        for _ in 0..600 {
             feedback.adjust(&options, 0.0, &CALM, 14.0);
         }
         assert!((feedback.fixed_ms - 14.0).abs() < 1e-6, "{}", feedback.fixed_ms);

@@ -45,25 +45,30 @@ pub struct LakhiaOptions {
     pub time: TimeModel,
 }
 
+impl LakhiaOptions {
+    /// Table 6.1's; where it says nothing, what was found best.
+    pub const DEFAULT: Self = Self {
+        target_ms: 30.0,
+        vis: 1.275,
+        fore: 0.45,
+        hyst_switch: 1500.0,
+        hyst_limit: 4510.0,
+        hyst_start: StartOfHysteresis::Affordable,
+        lookahead_s: 0.5,
+        least_distance: 1.0,
+        all_siblings: false,
+        v_time_gain: 0.1,
+        share_gain: 0.01,
+        share_slack: 0.05,
+        share_limit: 10.0,
+        share_feedback: ShareFeedback::Damped,
+        time: TimeModel::DEFAULT,
+    };
+}
+
 impl Default for LakhiaOptions {
     fn default() -> Self {
-        Self {
-            target_ms: 30.0,
-            vis: 1.275,
-            fore: 0.45,
-            hyst_switch: 1500.0,
-            hyst_limit: 4510.0,
-            hyst_start: StartOfHysteresis::Affordable,
-            lookahead_s: 0.5,
-            least_distance: 1.0,
-            all_siblings: false,
-            v_time_gain: 0.3,
-            share_gain: 0.01,
-            share_slack: 0.05,
-            share_limit: 10.0,
-            share_feedback: ShareFeedback::Damped,
-            time: TimeModel::default(),
-        }
+        Self::DEFAULT
     }
 }
 
@@ -108,10 +113,14 @@ pub struct TimeModel {
     pub fill_cost: f64,
 }
 
-impl Default for TimeModel {
+impl TimeModel {
     /// lavapipe on two cores: 0.7 ms for an empty frame of 1280 × 720, some 8 ms to fill it, and
     /// some 20 ms for 80,000 textured triangles (cost 0.6 each).
+    pub const DEFAULT: Self = Self { fixed_ms: 0.7, ms_per_cost: 0.0004, fill_cost: 20_000.0 };
+}
+
+impl Default for TimeModel {
     fn default() -> Self {
-        Self { fixed_ms: 0.7, ms_per_cost: 0.0004, fill_cost: 20_000.0 }
+        Self::DEFAULT
     }
 }

@@ -14,13 +14,18 @@ pub struct ResidencyOptions {
     pub evict_margin: f64,
 }
 
+impl ResidencyOptions {
+    /// A gigabyte, and what keeps frames even where it is the processor that draws.
+    pub const DEFAULT: Self = Self {
+        max_memory_bytes: 1 << 30,
+        chunk_bytes: 64 << 10,
+        upload_bytes: 4 << 20,
+        evict_margin: 0.1,
+    };
+}
+
 impl Default for ResidencyOptions {
     fn default() -> Self {
-        Self {
-            max_memory_bytes: 1 << 30,
-            chunk_bytes: 64 << 10,
-            upload_bytes: 4 << 20,
-            evict_margin: 0.1,
-        }
+        Self::DEFAULT
     }
 }
