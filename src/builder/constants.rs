@@ -281,11 +281,11 @@ impl Default for PrismConstants {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OutlineConstants {
-    /// A coarse node that keeps a smaller share of the covered ground or of the skyline is not
-    /// written, 0–1; 0: all are.
+    /// A coarse node that keeps a smaller share of the covered ground or of the skyline is given more
+    /// triangles, and where that is not enough it is not written, 0–1; 0: all are as they are.
     pub least_kept: f64,
-    /// Before a node is left out, it is given so many times the triangles again and again, over 1.
-    pub more_triangles: f64,
+    /// What is lost falls roughly by this root of the triangles, over 0: how many more are tried.
+    pub exponent: f64,
     /// But no more than this share of those of its children, 0–1.
     pub most_triangles: f64,
     /// Along the longer side of a node's ground, and columns of each skyline, 1 or more.
@@ -294,7 +294,7 @@ pub struct OutlineConstants {
 
 impl Default for OutlineConstants {
     fn default() -> Self {
-        Self { least_kept: 0.9, more_triangles: 1.5, most_triangles: 0.9, cells: 256 }
+        Self { least_kept: 0.9, exponent: 1.25, most_triangles: 0.9, cells: 256 }
     }
 }
 

@@ -55,7 +55,7 @@ fn poplars(folder: &Path) {
 }
 
 fn options(least_kept: f64) -> BuildOptions {
-    let outline = OutlineConstants { least_kept, ..OutlineConstants::default() };
+    let outline = OutlineConstants { least_kept, ..Default::default() };
     let constants = Constants { outline, ..Constants::default() };
     let hierarchy =
         HierarchyOptions { desired_tris: 300, constants, ..HierarchyOptions::default() };

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::BlockBuilder;
 use super::node::{Forest, NodeDraft, NodeSink, Tree};
-use super::outline::{LeftOut, SourceOutline};
+use super::outline::{LeftOut, SourceOutline, more_triangles};
 use crate::Result;
 use crate::builder::border::cap::cap_sections;
 use crate::builder::border::skirt::{Skirt, skirts, triangles_of};
@@ -158,7 +158,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let mut budget = node.budget as f64;
         let most = budget * self.resolutions.step(node.resolution) * constants.most_triangles;
         while kept.least() < constants.least_kept {
-            budget *= constants.more_triangles;
+            budget *= more_triangles(kept.least(), constants);
             if budget > most {
                 break;
             }

@@ -7,6 +7,10 @@ use crate::builder::constants::OutlineConstants;
 use crate::builder::error::Original;
 use crate::mesh::{Kept, Mesh, Outline, OutlineFrame, UpAxis};
 
+/// Of triangles, from one attempt to the next.
+const LEAST_MORE: f64 = 1.15;
+const MOST_MORE: f64 = 2.0;
+
 /// A coarse node that is not written, since it would keep too little of the outline of its source:
 /// the nodes below it stand in its place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,6 +21,14 @@ pub struct LeftOut {
     pub triangles: u64,
     /// What it would have kept with these.
     pub kept: Kept,
+}
+
+/// How many times the triangles a node needs that keeps too small a share of the outline: by a law
+/// that holds roughly for houses, and never so few more or so many that a guess is worth little.
+pub(super) fn more_triangles(kept: f64, constants: &OutlineConstants) -> f64 {
+    let excess = (1.0 - kept) / (1.0 - constants.least_kept).max(f64::MIN_POSITIVE);
+    // libm's, which is alike on all machines.
+    libm::pow(excess, constants.exponent).clamp(LEAST_MORE, MOST_MORE)
 }
 
 /// The outline of what a node stands for.
