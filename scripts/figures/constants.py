@@ -53,6 +53,9 @@ TRIED = {
     ("prisms", "least_height"): (0.0, 0.3),
     ("prisms", "least_walls"): (0.1, 0.6),
     ("prisms", "wall_rise"): (0.2, 0.7),
+    ("outline", "least_kept"): (0.8, 0.95),
+    ("outline", "exponent"): (0.6, 2.5),
+    ("outline", "most_triangles"): (0.5, 1.0),
     ("measure", "points"): (256, 2048),
     ("measure", "aside"): (0.1, 0.6),
     ("measure", "most_smaller"): (0.5, 0.99),
@@ -63,12 +66,16 @@ TRIED = {
 def main():
     quick = "two constants on two sets"
     runs = ("the fastest of how many builds, thrice as many for those of measuring", 1)
-    arguments = Options("constants", __doc__, quick, runs).parse()
+    options = Options("constants", __doc__, quick, runs)
+    options.add_argument("--groups", nargs="+", help="these alone, printed [all, written]")
+    arguments = options.parse()
     programs = Programs(examples=["build_with"])
     sets = {name: real_data(name) for name in SETS}
     sets["a city"] = [programs.city("constants", **CITY)]
     sets = {name: models for name, models in sets.items() if models}
     defaults = json.loads(subprocess.check_output([programs.path("examples/build_with"), "{}"]))
+    if arguments.groups:
+        defaults = {group: defaults[group] for group in arguments.groups}
     if arguments.quick:
         sets = dict(list(sets.items())[1:3])
         defaults = {"cut": {"row": defaults["cut"]["row"], "uncut": defaults["cut"]["uncut"]}}
@@ -88,7 +95,7 @@ def main():
         parts += [f"### `{group}`", table(head, rows).rstrip()]
     text = "\n\n".join([machine(), *parts]) + "\n"
     print(text)
-    if arguments.write:
+    if arguments.write and not arguments.groups:
         write_between_markers(DOCS / "constants.md", "figures", text)
 
 
