@@ -9,9 +9,10 @@ use std::time::Instant;
 
 use glam::DVec3;
 use hlod::camera::{Pose, View, from_angles};
+use hlod::engine::policies::lakhia::{Lakhia, LakhiaOptions};
+use hlod::engine::{FrameInput, Policy, Residents, Selection};
 use hlod::mesh::UpAxis;
-use hlod::runtime::lakhia::{Lakhia, LakhiaOptions};
-use hlod::runtime::{Policy, Residents, SceneTree, Selection};
+use hlod::runtime::SceneTree;
 
 #[path = "../tests/bench/tall_street.rs"]
 mod tall_street;
@@ -50,14 +51,15 @@ impl Case {
 
     fn measure(&mut self) {
         let Self { tree, residents, best_ms, selection } = self;
-        // Time for all of them.
-        let options = LakhiaOptions { target_ms: 1e9, ..LakhiaOptions::default() };
-        let mut policy = Lakhia::new(options);
-        policy.select(tree, &view(0), residents, selection);
+        let mut policy = Lakhia::new(LakhiaOptions::default());
+        let mut select = |frame| {
+            // Time for all of them.
+            let (view, target_ms, dt_s) = (&view(frame), 1e9, 0.02);
+            policy.select(&FrameInput { tree, view, residents, target_ms, dt_s }, selection);
+        };
+        select(0);
         let begin = Instant::now();
-        for frame in 0..FRAMES {
-            policy.select(tree, &view(frame), residents, selection);
-        }
+        (0..FRAMES).for_each(select);
         *best_ms = best_ms.min(begin.elapsed().as_secs_f64() * 1e3 / f64::from(FRAMES));
     }
 }

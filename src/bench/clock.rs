@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::runtime::lakhia::TimeModel;
+use crate::engine::policies::lakhia::TimeModel;
 use crate::{Error, Result};
 
 /// The version of the file that [`ClockConstants::write`] writes.

@@ -2,13 +2,15 @@
 
 use serde::Serialize;
 
-use crate::runtime::lakhia::LakhiaOptions;
+use crate::engine::policies::lakhia::LakhiaOptions;
 use crate::runtime::residency::ResidencyOptions;
 use crate::{Error, Result};
 
 /// All that determines a run, beside scene and path.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BenchOptions {
+    /// Milliseconds that a frame may take (`c_targetTime`), above 0.
+    pub target_ms: f64,
     /// How levels are chosen.
     pub selection: LakhiaOptions,
     /// Memory and loading.
@@ -21,12 +23,28 @@ pub struct BenchOptions {
     pub warm_up_frames: u64,
 }
 
+impl Default for BenchOptions {
+    fn default() -> Self {
+        Self {
+            target_ms: Self::TARGET_MS,
+            selection: LakhiaOptions::DEFAULT,
+            residency: ResidencyOptions::DEFAULT,
+            pace: Pace::default(),
+            size: Size::default(),
+            warm_up_frames: 0,
+        }
+    }
+}
+
 impl BenchOptions {
+    /// What a frame may take unless that is said.
+    pub const TARGET_MS: f64 = 30.0;
+
     /// Refuses what is out of range, by the name of the option.
     pub fn check(&self) -> Result<()> {
         let selection = &self.selection;
         let ranges = [
-            ("--target-ms", selection.target_ms, selection.target_ms > 0.0, "above 0"),
+            ("--target-ms", self.target_ms, self.target_ms > 0.0, "above 0"),
             ("--vis", selection.vis, selection.vis >= 0.0, "at least 0"),
             ("--fore", selection.fore, (0.0..=1.0).contains(&selection.fore), "0 to 1"),
             ("--hyst-switch", selection.hyst_switch, selection.hyst_switch > 0.0, "above 0"),

@@ -5,9 +5,9 @@ use std::sync::{Arc, Mutex};
 use super::{BenchOptions, FrameInspector, FrameRecord, FrameSample, Pace};
 use crate::Result;
 use crate::camera::{CameraPath, View};
-use crate::engine::{Backend, Engine};
+use crate::engine::{Backend, Engine, Policy};
+use crate::runtime::SceneTree;
 use crate::runtime::residency::Residency;
-use crate::runtime::{Policy, SceneTree};
 
 /// What a run needs.
 pub struct Replay<'a> {
@@ -42,7 +42,7 @@ pub struct Run {
 /// false.
 pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -> Result<Run> {
     let Replay { tree, path, policy, residency, backend, mut inspector, options } = replay;
-    let mut engine = Engine::start(tree, policy, residency, backend)?;
+    let mut engine = Engine::start(tree, policy, residency, backend, options.target_ms)?;
     let view =
         |index: usize| View::new(path.frames[index].pose, path.velocity(index), options.size.0);
     let interval_s = |index: usize| match options.pace {

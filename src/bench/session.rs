@@ -9,12 +9,13 @@ use super::{
 };
 use crate::Result;
 use crate::camera::CameraPath;
+use crate::engine::Policy;
+use crate::engine::policies::lakhia::Lakhia;
 use crate::format::Scene;
 use crate::loading::NodeFiles;
 use crate::render::content::{held_bytes, picture_bytes};
-use crate::runtime::lakhia::Lakhia;
+use crate::runtime::SceneTree;
 use crate::runtime::residency::{Residency, Sizes};
-use crate::runtime::{Policy, SceneTree};
 
 /// A built scene that is open for runs.
 #[derive(Clone, Debug)]

@@ -47,7 +47,7 @@ pub struct Context {
 /// The summary of a run, as `summary.json` holds it.
 pub fn summary(run: &Run, context: &Context) -> Value {
     let frames = &run.frames;
-    let target = context.options.selection.target_ms;
+    let target = context.options.target_ms;
     let of = |field: fn(&FrameRecord) -> f64| frames.iter().map(field).collect::<Vec<f64>>();
     let times = of(|frame| frame.report.frame_ms);
     let share = |holds: &dyn Fn(&f64) -> bool| {
@@ -222,7 +222,7 @@ fn longest(frames: &[FrameRecord], holds: fn(&FrameRecord) -> bool) -> usize {
 pub fn summary_text(summary: &Value) -> String {
     let number = |path: &str| summary.pointer(path).and_then(Value::as_f64).unwrap_or(f64::NAN);
     let mib = |path: &str| number(path) / f64::from(1 << 20);
-    let target = number("/parameters/selection/target_ms");
+    let target = number("/parameters/target_ms");
     let mut out = String::new();
     let mut line = |name: &str, text: String| {
         // Writing to a string cannot fail.

@@ -14,7 +14,7 @@ type Column = (&'static str, &'static str, usize, &'static str);
 
 /// In the order of the table; the first is the target.
 const COLUMNS: [Column; 14] = [
-    ("target_ms", "target, ms", 1, "/parameters/selection/target_ms"),
+    ("target_ms", "target, ms", 1, "/parameters/target_ms"),
     ("frame_ms_mean", "frame, ms", 1, "/frame_ms/mean"),
     ("frame_ms_p95", "p95", 1, "/frame_ms/p95"),
     ("late_share", "late", 3, "/late_share"),
@@ -108,7 +108,7 @@ mod tests {
 
     fn run(target: f64, frame: f64, flip: Option<f64>) -> Value {
         json!({
-            "parameters": { "selection": { "target_ms": target } },
+            "parameters": { "target_ms": target },
             "frame_ms": { "mean": frame, "p95": frame * 1.2 },
             "accuracy": flip.map(|flip| json!({ "flip_mean": { "mean": flip, "max": 2.0 * flip } })),
         })

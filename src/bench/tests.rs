@@ -6,13 +6,14 @@ use glam::DVec3;
 
 use super::write::frames_csv;
 use super::*;
-use crate::camera::{CameraPath, PathFrame, Pose, View, from_angles};
+use crate::camera::{CameraPath, PathFrame, Pose, from_angles};
+use crate::engine::policies::lakhia::{Lakhia, TimeModel};
+use crate::engine::{FrameInput, FrameOutcome, Policy, Selection};
 use crate::format::Scene;
 use crate::mesh::UpAxis;
-use crate::runtime::lakhia::{Lakhia, TimeModel};
+use crate::runtime::SceneTree;
 use crate::runtime::residency::{Residency, ResidencyOptions, Sizes};
 use crate::runtime::test_tree::{Sketch, scene, sketch};
-use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection};
 
 /// A street of houses along x, each of three levels with two children a node.
 fn street(houses: usize) -> Scene {
@@ -45,10 +46,9 @@ fn walk(frames: usize) -> CameraPath {
 }
 
 fn options(max_memory_bytes: u64) -> BenchOptions {
-    let mut options = BenchOptions::default();
-    options.selection.target_ms = 3.0;
+    let residency = ResidencyOptions { max_memory_bytes, ..ResidencyOptions::default() };
+    let mut options = BenchOptions { target_ms: 3.0, residency, ..BenchOptions::default() };
     options.selection.time = TimeModel { fixed_ms: 0.5, ms_per_cost: 0.001, fill_cost: 0.0 };
-    options.residency = ResidencyOptions { max_memory_bytes, ..ResidencyOptions::default() };
     options
 }
 
@@ -237,9 +237,9 @@ fn a_run_is_written_whole_and_compares_with_itself_and_not_with_another_target()
     let limits = Limits { max: vec!["toggles=+0".parse().unwrap()] };
     let comparison = compare(&first, &second, &limits, false).unwrap();
     assert!(!comparison.exceeded() && comparison.differences.is_empty());
-    other.selection.target_ms = 2.0;
+    other.target_ms = 2.0;
     let error = compare(&first, &write("third", other), &limits, false).unwrap_err();
-    assert!(error.to_string().contains("parameters.selection.target_ms: 3.0 against 2.0"));
+    assert!(error.to_string().contains("parameters.target_ms: 3.0 against 2.0"));
 }
 
 /// Draws the roots, and from the third frame on the first child of the first root beside them.
@@ -251,13 +251,8 @@ impl Policy for Overlapping {
         "overlapping"
     }
 
-    fn select(
-        &mut self,
-        tree: &SceneTree,
-        view: &View,
-        residents: &Residents,
-        out: &mut Selection,
-    ) {
+    fn select(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
+        let &FrameInput { tree, view, residents, .. } = frame;
         out.clear();
         self.0 += 1;
         let child = tree.children(tree.roots()[0])[0];
@@ -271,7 +266,7 @@ impl Policy for Overlapping {
         }
     }
 
-    fn priority(&self, _: &SceneTree, _: u32, _: &View) -> f64 {
+    fn priority(&self, _: &FrameInput<'_>, _: u32) -> f64 {
         0.0
     }
 

@@ -3,7 +3,8 @@
 use std::fmt;
 
 use crate::camera::View;
-use crate::runtime::{Residents, SceneTree};
+use crate::engine::Residents;
+use crate::runtime::SceneTree;
 
 /// A rule that a front breaks, and the node at which it does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,10 +2,13 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use super::{Backend, FrameReport, FrontCheck, Inspect};
+use super::{
+    Backend, FrameInput, FrameOutcome, FrameReport, FrontCheck, Inspect, Policy, Residents,
+    Selection,
+};
 use crate::camera::View;
 use crate::runtime::residency::Residency;
-use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection, ToggleCounter};
+use crate::runtime::{SceneTree, ToggleCounter};
 use crate::{Error, Result};
 
 /// Nodes in memory whose priority is renewed in each frame though nothing visited them.
@@ -17,6 +20,9 @@ pub struct Engine<'a> {
     policy: &'a mut dyn Policy,
     residency: Arc<Mutex<Residency>>,
     backend: &'a mut dyn Backend,
+    target_ms: f64,
+    /// Seconds since the frame before began.
+    dt_s: f64,
     residents: Residents,
     selection: Selection,
     /// The front of the frame before.
@@ -39,12 +45,13 @@ pub fn lock(residency: &Mutex<Residency>) -> Result<MutexGuard<'_, Residency>> {
 }
 
 impl<'a> Engine<'a> {
-    /// Loads the roots of a scene.
+    /// Loads the roots of a scene, of which a frame may take `target_ms`.
     pub fn start(
         tree: &'a SceneTree,
         policy: &'a mut dyn Policy,
         residency: Arc<Mutex<Residency>>,
         backend: &'a mut dyn Backend,
+        target_ms: f64,
     ) -> Result<Self> {
         backend.load_roots(&residency, tree.roots())?;
         let (start_bytes, read_bytes) = {
@@ -56,6 +63,8 @@ impl<'a> Engine<'a> {
             policy,
             residency,
             backend,
+            target_ms,
+            dt_s: 0.0,
             residents: Residents::none(tree.len()),
             selection: Selection::default(),
             before: Vec::new(),
@@ -87,7 +96,9 @@ impl<'a> Engine<'a> {
         report.upload_ms = self.backend.apply(&changes)?;
 
         let before = self.backend.now_ms();
-        self.policy.select(self.tree, view, &self.residents, &mut self.selection);
+        let &mut Self { tree, target_ms, dt_s, ref residents, .. } = self;
+        let input = FrameInput { tree, view, residents, target_ms, dt_s };
+        self.policy.select(&input, &mut self.selection);
         report.select_ms = self.backend.now_ms() - before;
         let front = &self.selection.front;
         self.check.check(self.tree, front, view, &self.residents).map_err(|fault| {
@@ -107,6 +118,7 @@ impl<'a> Engine<'a> {
         self.backend.end_frame(&self.residency, report.frame_ms, interval_s * 1e3)?;
         self.count(&mut report)?;
         self.frames += 1;
+        self.dt_s = (report.frame_ms / 1e3).max(interval_s);
         Ok(report)
     }
 
@@ -150,7 +162,9 @@ impl<'a> Engine<'a> {
         let mut residency = lock(&self.residency)?;
         residency.stale(STALE_PER_FRAME, &mut self.stale);
         self.others.clear();
-        let priority = |&node: &u32| (node, self.policy.priority(self.tree, node, view));
+        let &mut Self { tree, target_ms, dt_s, ref residents, .. } = self;
+        let input = FrameInput { tree, view, residents, target_ms, dt_s };
+        let priority = |&node: &u32| (node, self.policy.priority(&input, node));
         self.others.extend(self.stale.iter().map(priority));
         let Selection { front, priorities, keep_visited, .. } = &self.selection;
         residency.set_priorities(priorities, &self.others);

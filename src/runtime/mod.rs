@@ -1,11 +1,9 @@
-//! The engine at run time, without files, threads of its own, or a graphics card: which nodes a
-//! frame draws ([`Policy`]) and which are in memory ([`residency`]).
+//! What policies and the engine rest on, without files, threads of its own, or a graphics card: the
+//! tree as selection needs it, and which nodes are in memory ([`residency`]).
 //!
 //! Time enters as an argument, so that a run can be replayed exactly.
 
 mod front_before;
-pub mod lakhia;
-mod policy;
 pub mod residency;
 mod screen_coverage;
 #[cfg(test)]
@@ -14,7 +12,6 @@ mod toggles;
 mod tree;
 
 pub use front_before::front_before;
-pub use policy::{FrameOutcome, Policy, Residents, Selection};
 pub use screen_coverage::{ScreenCoverage, covered};
 pub use toggles::{ToggleCounter, Toggles};
 pub use tree::{SceneTree, TreeNode};

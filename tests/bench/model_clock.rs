@@ -5,10 +5,10 @@ use std::sync::{Arc, Mutex};
 use glam::DVec3;
 use hlod::bench::{BenchOptions, ClockConstants, FrameRecord, ModelBackend, Replay, run};
 use hlod::camera::{CameraPath, PathFrame, Pose, from_angles};
+use hlod::engine::policies::lakhia::Lakhia;
 use hlod::format::Scene;
 use hlod::mesh::UpAxis;
 use hlod::runtime::SceneTree;
-use hlod::runtime::lakhia::Lakhia;
 use hlod::runtime::residency::{Residency, Sizes};
 
 use crate::bench_support::{Place, city, hlod_bench};
@@ -61,8 +61,7 @@ fn replay(scene: &Scene, frames: usize, target_ms: f64) -> Vec<FrameRecord> {
         ms_per_node: 0.0,
         ..ClockConstants::default()
     };
-    let mut options = BenchOptions::default();
-    options.selection.target_ms = target_ms;
+    let mut options = BenchOptions { target_ms, ..BenchOptions::default() };
     options.selection.share_limit = 1.0;
     options.selection.time = constants.time_model();
     let sizes = Sizes::new(scene, |vertices, _, _| u64::from(vertices) * 24, |_| 0);

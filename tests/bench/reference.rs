@@ -178,10 +178,7 @@ fn a_sweep_has_a_run_and_a_line_for_each_target() {
     assert_eq!(targets, ["10", "40"]);
     for target in targets {
         let summary = place.summary(&format!("s/target-{target}"));
-        assert_eq!(
-            summary["parameters"]["selection"]["target_ms"].to_string(),
-            format!("{target}.0")
-        );
+        assert_eq!(summary["parameters"]["target_ms"].to_string(), format!("{target}.0"));
         assert_eq!(summary["accuracy"]["every"], 10);
     }
     assert!(place.path().join("s/sweep.html").is_file());

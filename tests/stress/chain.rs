@@ -99,8 +99,7 @@ impl Chain {
 
 /// A target that shows some of all levels, and counters that switch within so few frames.
 pub fn bench_options(scale: f64) -> BenchOptions {
-    let mut options = BenchOptions::default();
-    options.selection.target_ms = 10.0;
+    let mut options = BenchOptions { target_ms: 10.0, ..BenchOptions::default() };
     options.selection.hyst_switch = 10.0;
     options.selection.hyst_limit = 30.0;
     options.selection.least_distance = scale;

@@ -148,7 +148,7 @@ fn views_at_their_limits() {
 
     let target = |target_ms| {
         let mut bench = usual;
-        bench.selection.target_ms = target_ms;
+        bench.target_ms = target_ms;
         hills.replay(&still(place, 60.0), bench, clock())
     };
     check("target of 0.01 ms", target(0.01), "of 0.02 ms", target(0.02));

@@ -12,7 +12,8 @@ fn summary() -> Value {
         "policy": "lakhia",
         "clock": "model",
         "parameters": {
-            "selection": { "target_ms": 30.0, "time": { "fixed_ms": 9.0 } },
+            "target_ms": 30.0,
+            "selection": { "time": { "fixed_ms": 9.0 } },
             "size": [1280, 720],
         },
         "clock_constants": { "fixed_ms": 9.0 },
@@ -114,11 +115,7 @@ fn runs_of_different_things_are_refused_and_named_unless_forced() {
         ("/frames", json!(7), "frames: 100 against 7"),
         ("/policy", json!("other"), r#"policy: "lakhia" against "other""#),
         ("/clock", json!("wall"), r#"clock: "model" against "wall""#),
-        (
-            "/parameters/selection/target_ms",
-            json!(16),
-            "parameters.selection.target_ms: 30.0 against 16",
-        ),
+        ("/parameters/target_ms", json!(16), "parameters.target_ms: 30.0 against 16"),
         ("/parameters/size", json!([1, 2]), "parameters.size: [1280,720] against [1,2]"),
         ("/clock_constants/fixed_ms", json!(1.0), "clock_constants.fixed_ms: 9.0 against 1.0"),
         (

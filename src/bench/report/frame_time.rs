@@ -11,7 +11,7 @@ const BARS: usize = 60;
 
 pub(super) fn figures(frames: &[FrameRecord], context: &Context) -> Vec<Figure> {
     let frame = Places::frames(frames);
-    let target = context.options.selection.target_ms;
+    let target = context.options.target_ms;
     let actual = of(frames, |frame| frame.report.frame_ms);
     let (y, count) = range(&actual, &[target]);
     let told = beyond(&actual, count, "ms");

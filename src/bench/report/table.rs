@@ -83,7 +83,7 @@ pub(super) fn groups(summary: &Value) -> Vec<Group> {
         Group {
             title: "Frame time (6.4)",
             rows: vec![
-                Row("target", ms("/parameters/selection/target_ms"), "30 ms"),
+                Row("target", ms("/parameters/target_ms"), "30 ms"),
                 Row("mean", ms("/frame_ms/mean"), ""),
                 Row("median (p50)", ms("/frame_ms/p50"), ""),
                 Row("p95", ms("/frame_ms/p95"), ""),

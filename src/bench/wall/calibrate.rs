@@ -11,10 +11,11 @@ use crate::Result;
 use crate::bench::statistics::percentile;
 use crate::bench::{CLOCK_FILE_VERSION, ClockConstants};
 use crate::camera::{CameraPath, Pose, View};
+use crate::engine::policies::lakhia::{Lakhia, LakhiaOptions, TimeModel};
+use crate::engine::{FrameInput, Policy, Residents, Selection};
 use crate::loading::NodeFiles;
 use crate::render::Renderer;
-use crate::runtime::lakhia::{Lakhia, LakhiaOptions, TimeModel};
-use crate::runtime::{Policy, Residents, SceneTree, Selection, covered};
+use crate::runtime::{SceneTree, covered};
 
 /// How often a frame is drawn for one figure; the median counts.
 const REPEATS: usize = 7;
@@ -160,10 +161,12 @@ fn time_model(fixed_ms: f64, ms_per_cost: f64, fill_ms: f64, samples: &[Sample])
 /// What selection would draw from a place where all is in memory and a frame may take
 /// `target_ms`.
 fn choose(tree: &SceneTree, pose: &Pose, size: [u32; 2], target_ms: f64) -> Vec<u32> {
-    let mut policy = Lakhia::new(LakhiaOptions { target_ms, ..LakhiaOptions::default() });
+    let mut policy = Lakhia::new(LakhiaOptions::default());
     let mut selection = Selection::default();
     let view = View::new(*pose, DVec3::ZERO, size);
-    policy.select(tree, &view, &Residents::all(tree.len()), &mut selection);
+    let residents = Residents::all(tree.len());
+    let frame = FrameInput { tree, view: &view, residents: &residents, target_ms, dt_s: 0.0 };
+    policy.select(&frame, &mut selection);
     selection.front
 }
 

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use hlod::bench::{BenchOptions, Pace, Session, Size};
-use hlod::runtime::lakhia::{LakhiaOptions, ShareFeedback, StartOfHysteresis};
+use hlod::engine::policies::lakhia::{LakhiaOptions, ShareFeedback, StartOfHysteresis};
 use hlod::runtime::residency::ResidencyOptions;
 
 const LAKHIA: LakhiaOptions = LakhiaOptions::DEFAULT;
@@ -205,8 +205,8 @@ impl RunArgs {
     pub fn options(&self, session: &Session) -> BenchOptions {
         let least = (session.tree().diagonal() / 100.0).clamp(1e-6, 1.0);
         BenchOptions {
+            target_ms: self.target_ms.unwrap_or(BenchOptions::TARGET_MS),
             selection: LakhiaOptions {
-                target_ms: self.target_ms.unwrap_or(LAKHIA.target_ms),
                 vis: self.vis,
                 fore: self.fore,
                 hyst_switch: self.hyst_switch,

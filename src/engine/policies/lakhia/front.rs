@@ -8,9 +8,8 @@ use super::benefit::{NodeScore, score};
 use super::feedback::{Feedback, PendingChange};
 use super::hysteresis::Hysteresis;
 use crate::camera::View;
-use crate::runtime::{
-    FrameOutcome, Policy, Residents, SceneTree, ScreenCoverage, Selection, TreeNode,
-};
+use crate::engine::{FrameInput, FrameOutcome, Policy, Selection};
+use crate::runtime::{ScreenCoverage, TreeNode};
 
 /// The policy of Lakhia's thesis.
 #[derive(Clone, Debug)]
@@ -24,6 +23,8 @@ pub struct Lakhia {
     covered: ScreenCoverage,
     /// What its siblings would do to later frames.
     pending: PendingChange,
+    /// Milliseconds that a frame may take.
+    target_ms: f64,
     /// Milliseconds of this frame that nodes met for the first time may still take.
     room_ms: f64,
     queue: VecDeque<Siblings>,
@@ -77,6 +78,7 @@ impl Lakhia {
             cost: 0.0,
             covered: ScreenCoverage::default(),
             pending: PendingChange::NONE,
+            target_ms: 0.0,
             room_ms: 0.0,
             queue: VecDeque::new(),
             scores: Vec::new(),
@@ -85,14 +87,8 @@ impl Lakhia {
 
     /// Visits siblings: draws their parent, or those of them that have no children, and goes on
     /// to the children of the others.
-    fn visit(
-        &mut self,
-        tree: &SceneTree,
-        siblings: Siblings,
-        view: &View,
-        residents: &Residents,
-        out: &mut Selection,
-    ) {
+    fn visit(&mut self, frame: &FrameInput<'_>, siblings: Siblings, out: &mut Selection) {
+        let &FrameInput { tree, view, residents, .. } = frame;
         let (indices, nodes) = tree.at(siblings.places.clone());
         let mut sums = Sums::default();
         self.scores.clear();
@@ -220,43 +216,37 @@ impl Policy for Lakhia {
         "lakhia"
     }
 
-    fn select(
-        &mut self,
-        tree: &SceneTree,
-        view: &View,
-        residents: &Residents,
-        out: &mut Selection,
-    ) {
+    fn select(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
         out.clear();
-        self.hysteresis.resize(tree.len());
+        self.hysteresis.resize(frame.tree.len());
+        self.target_ms = frame.target_ms;
         let before_ms = self.feedback.fixed_ms + self.feedback.v_time * self.load();
-        self.room_ms = self.options.target_ms - before_ms;
+        self.room_ms = self.target_ms - before_ms;
+        let share_ms = self.feedback.share_ms(&self.options, self.target_ms);
         (self.cost, self.covered, self.pending) =
             (0.0, ScreenCoverage::default(), PendingChange::NONE);
         self.queue.clear();
-        self.queue.push_back(Siblings {
-            places: tree.root_places(),
-            parent: None,
-            share_ms: self.feedback.share_ms,
-        });
+        self.queue.push_back(Siblings { places: frame.tree.root_places(), parent: None, share_ms });
         // First in, first out: all siblings come before the children of any.
         while let Some(siblings) = self.queue.pop_front() {
-            self.visit(tree, siblings, view, residents, out);
+            self.visit(frame, siblings, out);
         }
         let time = &self.options.time;
         out.covered = self.covered.part();
         out.keep_visited = self.options.all_siblings;
         out.v_time = self.feedback.v_time;
-        out.share_ms = self.feedback.share_ms;
+        out.share_ms = share_ms;
         out.estimated_ms = self.feedback.fixed_ms + self.feedback.v_time * self.load();
         out.estimated_without_feedback_ms = time.fixed_ms + time.ms_per_cost * self.load();
     }
 
-    fn priority(&self, tree: &SceneTree, node: u32, view: &View) -> f64 {
-        score(tree.node(node), view, &self.options).priority
+    fn priority(&self, frame: &FrameInput<'_>, node: u32) -> f64 {
+        score(frame.tree.node(node), frame.view, &self.options).priority
     }
 
     fn drawn(&mut self, outcome: &FrameOutcome) {
-        self.feedback.adjust(&self.options, self.load(), &self.pending, outcome.actual_ms);
+        let load = self.load();
+        let Self { options, pending, target_ms, .. } = self;
+        self.feedback.adjust(options, *target_ms, load, pending, outcome.actual_ms);
     }
 }

@@ -2,13 +2,13 @@
 
 use super::*;
 use crate::camera::View;
+use crate::engine::{FrameInput, FrameOutcome, Policy, Residents, Selection};
+use crate::runtime::SceneTree;
 use crate::runtime::test_tree::{Sketch, sketch, tree, view};
-use crate::runtime::{FrameOutcome, Policy, Residents, SceneTree, Selection};
 
 /// Milliseconds for a unit of cost are 1, a frame without nodes takes none.
 fn options() -> LakhiaOptions {
     LakhiaOptions {
-        target_ms: 10.0,
         hyst_switch: 1.0,
         hyst_limit: 3.0,
         time: TimeModel { fixed_ms: 0.0, ms_per_cost: 1.0, fill_cost: 0.0 },
@@ -20,7 +20,8 @@ fn options() -> LakhiaOptions {
 
 fn select(policy: &mut Lakhia, tree: &SceneTree, view: &View, residents: &Residents) -> Selection {
     let mut out = Selection::default();
-    policy.select(tree, view, residents, &mut out);
+    let frame = FrameInput { tree, view, residents, target_ms: 10.0, dt_s: 0.0 };
+    policy.select(&frame, &mut out);
     out
 }
 

@@ -47,25 +47,27 @@ impl PendingChange {
 pub(super) struct Feedback {
     /// `v_time`: milliseconds for one unit of cost.
     pub v_time: f64,
-    /// `shareTime` of the roots, milliseconds.
-    pub share_ms: f64,
+    /// `shareTime` of the roots, as a multiple of the time that the target leaves for nodes.
+    share: f64,
     /// The fixed overhead, milliseconds.
     pub fixed_ms: f64,
 }
 
 impl Feedback {
     pub fn new(options: &LakhiaOptions) -> Self {
-        Self {
-            v_time: options.time.ms_per_cost,
-            share_ms: for_nodes(options),
-            fixed_ms: options.time.fixed_ms,
-        }
+        Self { v_time: options.time.ms_per_cost, share: 1.0, fixed_ms: options.time.fixed_ms }
+    }
+
+    /// `shareTime` of the roots, milliseconds.
+    pub fn share_ms(&self, options: &LakhiaOptions, target_ms: f64) -> f64 {
+        self.share * for_nodes(options, target_ms)
     }
 
     /// After a frame that took `load` units of cost beside the fixed overhead.
     pub fn adjust(
         &mut self,
         options: &LakhiaOptions,
+        target_ms: f64,
         load: f64,
         pending: &PendingChange,
         actual_ms: f64,
@@ -81,8 +83,8 @@ impl Feedback {
             self.v_time = (self.v_time + step).max(options.time.ms_per_cost * 1e-3);
         }
         // The second: time that is left goes to nodes that could use it.
-        let slack = options.share_slack * options.target_ms;
-        let left_ms = options.target_ms - actual_ms;
+        let slack = options.share_slack * target_ms;
+        let left_ms = target_ms - actual_ms;
         let refused = pending.cheapest_refused_ms.is_finite() || pending.refining_ms > 0.0;
         let (more, less) = match options.share_feedback {
             ShareFeedback::Plain => (refused && left_ms > slack, left_ms < -slack),
@@ -92,33 +94,33 @@ impl Feedback {
             ),
         };
         if more {
-            self.share_ms *= 1.0 + options.share_gain;
+            self.share *= 1.0 + options.share_gain;
         } else if less {
-            self.share_ms *= 1.0 - options.share_gain;
+            self.share *= 1.0 - options.share_gain;
         }
-        let [least, most] =
-            [LEAST_SHARE, options.share_limit].map(|factor| factor * for_nodes(options));
-        self.share_ms = self.share_ms.clamp(least, most);
+        self.share = self.share.clamp(LEAST_SHARE, options.share_limit);
     }
 }
 
 /// What the target leaves for nodes once the picture is filled; never nothing at all, so that
 /// shares keep their order.
-fn for_nodes(options: &LakhiaOptions) -> f64 {
+fn for_nodes(options: &LakhiaOptions, target_ms: f64) -> f64 {
     let time = &options.time;
     let fixed_ms = time.fixed_ms + time.ms_per_cost * time.fill_cost;
-    (options.target_ms - fixed_ms).max(0.01 * options.target_ms)
+    (target_ms - fixed_ms).max(0.01 * target_ms)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::lakhia::TimeModel;
+    use crate::engine::policies::lakhia::TimeModel;
 
     fn options() -> LakhiaOptions {
         let time = TimeModel { fixed_ms: 10.0, ms_per_cost: 0.1, fill_cost: 0.0 };
         LakhiaOptions { time, ..LakhiaOptions::default() }
     }
+
+    const TARGET_MS: f64 = 30.0;
 
     const CALM: PendingChange = PendingChange::NONE;
     const REFUSED: PendingChange =
@@ -128,11 +130,11 @@ mod tests {
     fn v_time_comes_to_what_is_observed() {
         let (options, mut feedback) = (options(), Feedback::new(&options()));
         for _ in 0..200 {
-            feedback.adjust(&options, 100.0, &CALM, 10.0 + 100.0 * 0.2);
+            feedback.adjust(&options, TARGET_MS, 100.0, &CALM, 10.0 + 100.0 * 0.2);
         }
         assert!((feedback.v_time - 0.2).abs() < 1e-6, "{}", feedback.v_time);
         // One frame moves it by the gain, no more.
-        feedback.adjust(&options, 100.0, &CALM, 10.0 + 100.0 * 1.2);
+        feedback.adjust(&options, TARGET_MS, 100.0, &CALM, 10.0 + 100.0 * 1.2);
         let moved = 0.2 + options.v_time_gain * (1.2 - 0.2);
         assert!((feedback.v_time - moved).abs() < 1e-6, "{}", feedback.v_time);
     }
@@ -141,11 +143,11 @@ mod tests {
     fn a_frame_without_nodes_tells_the_overhead_and_nothing_of_costs() {
         let (options, mut feedback) = (options(), Feedback::new(&options()));
         for _ in 0..600 {
-            feedback.adjust(&options, 0.0, &CALM, 14.0);
+            feedback.adjust(&options, TARGET_MS, 0.0, &CALM, 14.0);
         }
         assert!((feedback.fixed_ms - 14.0).abs() < 1e-6, "{}", feedback.fixed_ms);
         assert_eq!(feedback.v_time, 0.1);
-        feedback.adjust(&options, 100.0, &CALM, 24.0);
+        feedback.adjust(&options, TARGET_MS, 100.0, &CALM, 24.0);
         assert_eq!(feedback.v_time, 0.1, "what is above that overhead is the nodes'");
     }
 
@@ -153,9 +155,9 @@ mod tests {
     fn share(share_feedback: ShareFeedback, pending: PendingChange, actual_ms: f64) -> f64 {
         let options = LakhiaOptions { share_feedback, ..options() };
         let mut feedback = Feedback::new(&options);
-        assert_eq!(feedback.share_ms, 20.0);
-        feedback.adjust(&options, 100.0, &pending, actual_ms);
-        feedback.share_ms
+        assert_eq!(feedback.share_ms(&options, TARGET_MS), 20.0);
+        feedback.adjust(&options, TARGET_MS, 100.0, &pending, actual_ms);
+        feedback.share_ms(&options, TARGET_MS)
     }
 
     #[test]
@@ -191,10 +193,11 @@ mod tests {
             for actual in [0.0, 1e9, 5.0, f64::INFINITY, f64::NAN] {
                 for cost in [0.0, 1e-300, 1e9] {
                     for _ in 0..2000 {
-                        feedback.adjust(&options, cost, &REFUSED, actual);
+                        feedback.adjust(&options, TARGET_MS, cost, &REFUSED, actual);
                     }
                     assert!(feedback.v_time.is_finite() && feedback.v_time > 0.0);
-                    assert!(feedback.share_ms.is_finite() && feedback.share_ms > 0.0);
+                    let share_ms = feedback.share_ms(&options, TARGET_MS);
+                    assert!(share_ms.is_finite() && share_ms > 0.0);
                 }
             }
         }

@@ -1,7 +1,22 @@
 //! The seam at which ways of choosing levels of detail differ.
 
-use super::SceneTree;
 use crate::camera::View;
+use crate::runtime::SceneTree;
+
+/// What a policy sees of a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameInput<'a> {
+    /// The hierarchy, with its errors.
+    pub tree: &'a SceneTree,
+    /// The camera.
+    pub view: &'a View,
+    /// Which nodes can be drawn now.
+    pub residents: &'a Residents,
+    /// Milliseconds that the frame may take.
+    pub target_ms: f64,
+    /// Seconds since the frame before began; 0 in the first.
+    pub dt_s: f64,
+}
 
 /// Chooses what each frame draws, and says how much each node matters.
 ///
@@ -14,11 +29,11 @@ pub trait Policy {
 
     /// Chooses a front: nodes that cover everything visible, none of them above another, all of
     /// them resident. Called once a frame.
-    fn select(&mut self, tree: &SceneTree, view: &View, residents: &Residents, out: &mut Selection);
+    fn select(&mut self, frame: &FrameInput<'_>, out: &mut Selection);
 
-    /// How much a node matters for this view, on the scale of [`Selection::priorities`]; for
+    /// How much a node matters in this frame, on the scale of [`Selection::priorities`]; for
     /// nodes that [`select`](Policy::select) had no need to visit.
-    fn priority(&self, tree: &SceneTree, node: u32, view: &View) -> f64;
+    fn priority(&self, frame: &FrameInput<'_>, node: u32) -> f64;
 
     /// What became of the frame that was chosen last.
     fn drawn(&mut self, outcome: &FrameOutcome);

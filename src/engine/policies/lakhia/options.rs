@@ -5,8 +5,6 @@
 /// `c_desiredTris`, `c_levelFactor` and `c_textured` are the build's.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct LakhiaOptions {
-    /// `c_targetTime`: milliseconds that a frame may take, above 0.
-    pub target_ms: f64,
     /// `c_vis`: what being in view adds to the benefit of a node, at least 0.
     pub vis: f64,
     /// `c_fore`: how much the angle at which a node is seen matters, 0 to 1.
@@ -48,7 +46,6 @@ pub struct LakhiaOptions {
 impl LakhiaOptions {
     /// Table 6.1's; where it says nothing, what was found best.
     pub const DEFAULT: Self = Self {
-        target_ms: 30.0,
         vis: 1.275,
         fore: 0.45,
         hyst_switch: 1500.0,

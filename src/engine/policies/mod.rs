@@ -1,0 +1,3 @@
+//! The ways of choosing levels of detail, one module each.
+
+pub mod lakhia;
