@@ -57,13 +57,13 @@ def main():
     text = "\n\n".join(
         [
             machine(),
-            "Coarse nodes that each step gave:",
+            "Coarse nodes that each step gave, all of them written with their own budgets, however little "
+            "they keep of the outline:",
             table(["", *STEPS], wins).rstrip(),
             "What a build without a step changes: the RMS distance of its coarse levels, two-sided, "
             f"by {SAMPLES:,} points a surface, and the RMS difference of colours, both as the "
             "geometric mean of the levels' ratios; and the processor seconds. Where nothing is "
-            "said of distance and colour, no byte differs. All nodes are written, however little they "
-            "keep of the outline, with their own budgets: at equal triangles.",
+            "said of distance and colour, no byte differs.",
             table(head, losses),
         ]
     )

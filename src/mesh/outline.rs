@@ -89,7 +89,9 @@ impl OutlineFrame {
         }
         let columns = cells;
         let per_metre = cells as f64 / size.max_element();
-        let cells = [size.x, size.y].map(|side| ((side * per_metre).ceil() as usize).max(1));
+        let most = columns + 1; // rounded up
+        let cells =
+            [size.x, size.y].map(|side| ((side * per_metre).ceil() as usize).clamp(1, most));
         let sides = std::array::from_fn(|side| {
             // libm's, which is alike on all machines.
             let (sin, cos) = libm::sincos(PI * side as f64 / SIDES as f64);

@@ -145,6 +145,13 @@ fn an_input_with_nodes_left_out_is_taken_over_whole() {
     assert_ne!(before, after, "the other input has changed");
     write(folder.path(), "one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     build(&["one.obj", "out"]);
+    let left_out = |out: &str| {
+        let inputs = report(&folder.path().join(out))["inputs"].clone();
+        let slabs = |input: &&serde_json::Value| input["path"] == "slabs.obj";
+        inputs.as_array().unwrap().iter().find(slabs).unwrap()["left_out"].clone()
+    };
+    assert!(!left_out("out").as_array().unwrap().is_empty());
+    assert_eq!(left_out("out"), left_out("clean"));
     let [mut out, mut clean] = ["out", "clean"].map(|name| lasting(&folder.path().join(name)));
     for files in [&mut out, &mut clean] {
         // Budgets that were met are not kept from build to build.

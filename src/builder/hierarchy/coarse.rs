@@ -104,14 +104,15 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let Attempt { coarse, reason, kept, within_budget } = self.attempt(&source, &node);
         let NodeSurface { original, moved, error: below, .. } = source;
         let Coarse { simplified: Simplified { mesh, border, step, .. }, spans, skirts } = coarse;
-        let measured =
-            self.stages.time(Stage::Measure, || surface_error(&original, &mesh)).plus(moved);
-        let error = measured.at_least(&below);
-        let outcome = if kept.least() < self.options.constants.outline.least_kept {
+        let (outcome, error) = if kept.least() < self.options.constants.outline.least_kept {
             let triangles = (mesh.triangles.len() + triangles_of(&skirts)) as u64;
             let child_path = node.child_path.to_vec();
-            Outcome::LeftOut(LeftOut { child_path, triangles, kept })
+            // Nobody draws it: what is above need not be farther off than what is below.
+            (Outcome::LeftOut(LeftOut { child_path, triangles, kept }), below)
         } else {
+            let measured =
+                self.stages.time(Stage::Measure, || surface_error(&original, &mesh)).plus(moved);
+            let error = measured.at_least(&below);
             let on_border = |&&planes: &&u64| planes & node.path.bits() != 0;
             // Of what is written alone: parents take their colours from the original, too.
             let painted =
@@ -120,7 +121,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
                 Some((painted, skirts)) => (painted, skirts),
                 None => (&mesh, &skirts),
             };
-            Outcome::Written(self.sink.take(&NodeDraft {
+            let record = self.sink.take(&NodeDraft {
                 mesh: drawn,
                 skirts,
                 resolution: node.resolution,
@@ -131,7 +132,8 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
                 step,
                 baked: reason,
                 locked: border.planes.iter().filter(on_border).count(),
-            })?)
+            })?;
+            (Outcome::Written(record), error)
         };
         let baked = reason.is_some();
         Ok((outcome, NodeSurface { mesh, border, spans, original, moved, error, baked }))

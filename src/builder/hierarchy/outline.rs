@@ -1,19 +1,20 @@
 //! What a coarse node keeps of the outline of its source, and what becomes of one that keeps too
 //! little.
 
-use serde::{Deserialize, Serialize};
-
 use crate::builder::constants::OutlineConstants;
 use crate::builder::error::Original;
 use crate::mesh::{Kept, Mesh, Outline, OutlineFrame, UpAxis};
 
-/// Of triangles, from one attempt to the next.
+/// How many times the triangles the next attempt has, at least: fewer change too little to be worth
+/// one.
 const LEAST_MORE: f64 = 1.15;
+
+/// And at most: a guess is worth little so far off.
 const MOST_MORE: f64 = 2.0;
 
 /// A coarse node that is not written, since it would keep too little of the outline of its source:
 /// the nodes below it stand in its place.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LeftOut {
     /// Child numbers from the root of its block down.
     pub child_path: Vec<u32>,
@@ -23,8 +24,8 @@ pub struct LeftOut {
     pub kept: Kept,
 }
 
-/// How many times the triangles a node needs that keeps too small a share of the outline: by a law
-/// that holds roughly for houses, and never so few more or so many that a guess is worth little.
+/// How many times the triangles a node needs that keeps too small a share of the outline, by a law
+/// that holds roughly for houses.
 pub(super) fn more_triangles(kept: f64, constants: &OutlineConstants) -> f64 {
     let excess = (1.0 - kept) / (1.0 - constants.least_kept).max(f64::MIN_POSITIVE);
     // libm's, which is alike on all machines.
