@@ -5,7 +5,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{Adapter, DeviceDescriptor, MemoryHints, PollType, Queue, SubmissionIndex};
 
 use super::adapter::{self, AdapterLabel};
-use super::thread_affinity;
 use crate::{Error, Result};
 
 /// A graphics device and what it was last heard to complain of.
@@ -51,9 +50,6 @@ impl Device {
             lost(format!("the graphics device was lost ({reason:?}): {what}"));
         });
         let label = adapter::label(adapter);
-        if label.is_processor {
-            thread_affinity::bind_rasteriser_threads();
-        }
         Ok(Self { device, queue, label, complaint })
     }
 

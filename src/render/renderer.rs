@@ -20,6 +20,7 @@ use super::options::RenderOptions;
 use super::pipelines::Pipelines;
 use super::samplers::Samplers;
 use super::target::{Layer, Target};
+use super::thread_affinity;
 use super::warm_up::WarmUp;
 use crate::camera::Pose;
 use crate::{Error, Result};
@@ -100,9 +101,15 @@ impl Renderer {
         });
         let instances = instance_buffer(&device, INSTANCES);
         device.check()?;
+        let warm_up = WarmUp::new(&device);
+        if device.label.is_processor {
+            // llvmpipe's threads have no names before they have drawn.
+            warm_up.threads(&device)?;
+            thread_affinity::bind_rasteriser_threads();
+        }
         Ok(Self {
             options: options.clone(),
-            warm_up: WarmUp::new(&device),
+            warm_up,
             device,
             target,
             pipelines,

@@ -31,6 +31,13 @@ impl WarmUp {
         Self { target: Target::tiny(&device.device), done: FxHashSet::default() }
     }
 
+    /// Draws nothing, so that a driver which starts threads when it first draws has done so.
+    pub fn threads(&self, device: &Device) -> Result<()> {
+        let mut encoder = device.device.create_command_encoder(&Default::default());
+        drop(self.target.begin(&mut encoder, false));
+        device.wait(device.queue.submit([encoder.finish()]))
+    }
+
     /// Draws one triangle of each kind that a node has and that was not drawn yet. Draws whose
     /// shared picture is not there are left for later.
     pub fn node<'a>(
