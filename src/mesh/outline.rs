@@ -22,19 +22,12 @@ pub struct OutlineFrame {
     /// The corner of the ground, and the height of its lowest point.
     low: DVec3,
     /// Cells a metre.
-    per_metre: f64,
-    cells: [usize; 2],
-    /// Of a skyline.
-    columns: usize,
-    sides: [Side; SIDES],
-}
-
-/// Where a skyline runs.
-struct Side {
-    /// Its direction, columns a metre.
-    axis: DVec2,
-    /// Where it begins, in columns.
-    first: f64,
+    per_metre: DVec2,
+    /// Along each side of the ground, and columns of each skyline.
+    cells: usize,
+    /// By skyline: how many columns it runs to with each metre along either axis of the ground, and
+    /// where it begins, in columns.
+    sides: [[f64; SIDES]; 3],
 }
 
 /// What triangles cover, and how high they rise. They may be added by many threads at once.
@@ -70,9 +63,13 @@ pub struct Kept {
 
 const EMPTY: u64 = 0;
 
+/// Numbers that this is added to are rounded to whole ones.
+const WHOLE: f64 = 1.5 * (1u64 << 52) as f64;
+
 impl OutlineFrame {
-    /// Around these positions, with so many cells along the longer side of the ground, and as many
-    /// columns in each skyline; `None` where they cover no ground.
+    /// Around these positions, with so many cells along each side of the ground (square ones would be
+    /// wider than a long strip), and as many columns in each skyline; `None` where they are all in
+    /// one place seen from above.
     pub fn around(
         up: UpAxis,
         positions: impl IntoIterator<Item = DVec3>,
@@ -87,12 +84,10 @@ impl OutlineFrame {
         if !((high - low).is_finite() && size.max_element() > 0.0) {
             return None;
         }
-        let columns = cells;
-        let per_metre = cells as f64 / size.max_element();
-        let most = columns + 1; // rounded up
-        let cells =
-            [size.x, size.y].map(|side| ((side * per_metre).ceil() as usize).clamp(1, most));
-        let sides = std::array::from_fn(|side| {
+        // A side without length has no cells' centres on it.
+        let per_metre = size.map(|side| if side > 0.0 { cells as f64 / side } else { 0.0 });
+        let mut sides = [[0.0; SIDES]; 3];
+        for side in 0..SIDES {
             // libm's, which is alike on all machines.
             let (sin, cos) = libm::sincos(PI * side as f64 / SIDES as f64);
             let axis = DVec2::new(cos, sin);
@@ -100,21 +95,24 @@ impl OutlineFrame {
                 [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(|at| (at * size).dot(axis));
             let first = corners.into_iter().fold(f64::INFINITY, f64::min);
             let last = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
-            let per_metre = columns as f64 / (last - first).max(f64::MIN_POSITIVE);
-            Side { axis: axis * per_metre, first: first * per_metre }
-        });
-        Some(Self { up, low, per_metre, cells, columns, sides })
+            let per_metre = cells as f64 / (last - first).max(f64::MIN_POSITIVE);
+            let [x, y] = (axis * per_metre).to_array();
+            (sides[0][side], sides[1][side], sides[2][side]) = (x, y, first * per_metre);
+        }
+        Some(Self { up, low, per_metre, cells, sides })
     }
 
     /// An outline of nothing.
     pub fn empty(&self) -> Outline {
         let none = |count: usize| (0..count).map(|_| AtomicU64::new(EMPTY)).collect();
         Outline {
-            covered: none((self.cells[0] * self.cells[1]).div_ceil(64)),
-            top: none(SIDES * self.columns),
-            bottom: none(SIDES * self.columns),
-            columns: self.columns,
-            widths: self.sides.each_ref().map(|side| 1.0 / side.axis.length()),
+            covered: none((self.cells * self.cells).div_ceil(64)),
+            top: none(SIDES * self.cells),
+            bottom: none(SIDES * self.cells),
+            columns: self.cells,
+            widths: std::array::from_fn(|side| {
+                1.0 / DVec2::new(self.sides[0][side], self.sides[1][side]).length()
+            }),
         }
     }
 
@@ -122,29 +120,62 @@ impl OutlineFrame {
     pub fn add(&self, outline: &Outline, corners: [DVec3; 3]) {
         let corners = corners.map(|corner| self.up.z_up(corner) - self.low);
         self.cover(&outline.covered, corners);
-        for (side, &Side { axis, first }) in self.sides.iter().enumerate() {
-            let columns = side * self.columns..(side + 1) * self.columns;
-            let (top, bottom) = (&outline.top[columns.clone()], &outline.bottom[columns]);
-            let along = corners.map(|corner| corner.truncate().dot(axis) - first);
-            let columns = along.map(|along| centre(along, self.columns));
+        let heights = corners.map(|corner| corner.z.max(0.0));
+        let highest = top_bits(heights.into_iter().fold(0.0, f64::max));
+        let lowest = bottom_bits(heights.into_iter().fold(f64::INFINITY, f64::min));
+        let [along, columns] = self.on_skylines(corners);
+        for side in 0..SIDES {
+            let of = side * self.cells..(side + 1) * self.cells;
+            let (top, bottom) = (&outline.top[of.clone()], &outline.bottom[of]);
+            let columns = columns.map(|columns| columns[side]);
             if columns[0] == columns[1] && columns[1] == columns[2] {
+                continue;
+            }
+            let columns = columns.map(|column| column as usize);
+            let first = columns[0].min(columns[1]).min(columns[2]);
+            let end = columns[0].max(columns[1]).max(columns[2]);
+            // No edge is higher or lower than its ends, and few triangles are at the skyline.
+            let all = first..end;
+            if is_within(&top[all.clone()], highest) && is_within(&bottom[all], lowest) {
                 continue;
             }
             for (from, to) in [(0, 1), (1, 2), (2, 0)] {
                 let columns = columns[from].min(columns[to])..columns[from].max(columns[to]);
-                let end = |i: usize| DVec2::new(along[i], corners[i].z.max(0.0));
+                let end = |i: usize| DVec2::new(along[i][side], heights[i]);
                 rise(top, bottom, [end(from), end(to)], columns);
             }
         }
     }
 
+    /// Where corners lie along each skyline, in columns, and the first column whose centre is
+    /// farther: all skylines at once, without branches.
+    fn on_skylines(&self, corners: [DVec3; 3]) -> [[[f64; SIDES]; 3]; 2] {
+        let [along_x, along_y, first] = &self.sides;
+        let last = self.cells as f64;
+        let (mut along, mut columns) = ([[0.0; SIDES]; 3], [[0.0; SIDES]; 3]);
+        for corner in 0..3 {
+            let [x, y] = corners[corner].truncate().to_array();
+            for side in 0..SIDES {
+                let at = x * along_x[side] + y * along_y[side] - first[side];
+                along[corner][side] = at;
+                let at = if at > 0.0 { at } else { 0.0 };
+                let at = if at < last { at } else { last };
+                columns[corner][side] = (at + WHOLE) - WHOLE;
+            }
+        }
+        [along, columns]
+    }
+
     /// Marks the cells whose centres a triangle covers.
     fn cover(&self, covered: &[AtomicU64], corners: [DVec3; 3]) {
-        let corners = corners.map(|corner| DVec2::new(corner.y, corner.x) * self.per_metre);
-        for row in centres(corners.map(|corner| corner.x), self.cells[1]) {
+        let corners = corners.map(|corner| {
+            let [x, y] = (corner.truncate() * self.per_metre).to_array();
+            DVec2::new(y, x)
+        });
+        for row in centres(corners.map(|corner| corner.x), self.cells) {
             let Some([from, to]) = across(corners, row as f64 + 0.5) else { continue };
-            for column in centres([from, to], self.cells[0]) {
-                let bit = row * self.cells[0] + column;
+            for column in centres([from, to], self.cells) {
+                let bit = row * self.cells + column;
                 let word = &covered[bit / 64];
                 let mask = 1 << (bit % 64);
                 // Most are there already, and reading is cheaper.
@@ -166,9 +197,24 @@ fn rise(top: &[AtomicU64], bottom: &[AtomicU64], [from, to]: [DVec2; 2], columns
     let (low, high) = (from.y.min(to.y), from.y.max(to.y));
     for column in columns {
         let height = (from.y + (column as f64 + 0.5 - from.x) * slope).clamp(low, high);
-        raise(&top[column], height.max(f64::MIN_POSITIVE).to_bits());
-        raise(&bottom[column], u64::MAX - height.to_bits());
+        raise(&top[column], top_bits(height));
+        raise(&bottom[column], bottom_bits(height));
     }
+}
+
+/// How the highest point of a column is stored.
+fn top_bits(height: f64) -> u64 {
+    height.max(f64::MIN_POSITIVE).to_bits()
+}
+
+/// How the lowest point of a column is stored.
+fn bottom_bits(height: f64) -> u64 {
+    u64::MAX - height.to_bits()
+}
+
+/// True where all of these are as large already.
+fn is_within(most: &[AtomicU64], to: u64) -> bool {
+    most.iter().all(|most| most.load(Ordering::Relaxed) >= to)
 }
 
 /// The largest that was ever there.
@@ -390,6 +436,15 @@ mod tests {
         let upright = kept_of(UpAxis::Z, &all, few);
         assert!(upright.area.unwrap() < 0.5);
         assert_eq!(kept_of(UpAxis::Y, &turned(&all), &turned(few)), upright);
+    }
+
+    #[test]
+    fn a_strip_has_ground_however_thin_it_is() {
+        let strip = |length: f64| boxes(&[[DVec3::ZERO, DVec3::new(length, 0.01, 0.01)]]);
+        let whole = [DVec3::ZERO, DVec3::new(1e3, 0.01, 0.0)].map(|low| [low, DVec3::splat(0.01)]);
+        let source = [strip(1e3), boxes(&whole)].concat();
+        let kept = kept_of(UpAxis::Z, &source, &strip(500.0));
+        assert!((kept.area.unwrap() - 0.5).abs() < 1e-3, "{kept:?}");
     }
 
     #[test]
