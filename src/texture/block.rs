@@ -223,7 +223,7 @@ impl<'a> BlockTextures<'a> {
                     (uv[axis] - source.tile(bounds, axis)) * source.size[axis] - source.origin[axis]
                 })
             };
-            Some((texture, triangle.map(texel)))
+            Some((texture, chart, triangle.map(texel)))
         });
         self.classes = classes;
         self.source = Some(source);

@@ -73,6 +73,27 @@ impl Sampler<'_> {
         upper + (lower - upper) * down
     }
 
+    /// The mean of the square of two by two texels around a position, linear light, 0–1, and 1;
+    /// beyond the image its border texels go on.
+    #[inline]
+    pub fn mean_at(&self, at: DVec2) -> Vec4 {
+        let at = at.clamp(DVec2::ZERO, self.last + 0.999_999);
+        let [x, y] = [at.x as i32, at.y as i32];
+        let [along, down] = [(at.x - f64::from(x)) as f32, (at.y - f64::from(y)) as f32];
+        let [x, y] = [x as usize, y as usize];
+        let middle = y * self.row + x * self.channels;
+        let left = if x > 0 { self.channels } else { 0 };
+        let right = if x + 1 < self.size[0] { self.channels } else { 0 };
+        let above = if y > 0 { self.row } else { 0 };
+        let below = if y + 1 < self.size[1] { self.row } else { 0 };
+        let row = |start: usize| {
+            let (one, two) = (self.texel(start - left), self.texel(start));
+            one + (self.texel(start + right) - one) * along + two
+        };
+        let (one, two) = (row(middle - above), row(middle));
+        (one + (row(middle + below) - one) * down + two) * 0.25
+    }
+
     #[inline]
     fn texel(&self, start: usize) -> Vec4 {
         let texel = &self.bytes[start..start + 3];
@@ -432,6 +453,33 @@ mod tests {
         assert!(level.row(1, 0, 4).chunks(4).all(|texel| texel[0].abs_diff(200) <= 1
             && texel[2].abs_diff(50) <= 1
             && texel[3].abs_diff(128) <= 1));
+    }
+
+    #[test]
+    fn wide_samples_are_means_of_two_by_two_texels_anywhere() {
+        let source = image(9, 7, 3);
+        let region = Region { origin: [0; 2], size: [9, 7], covered: None };
+        let level = &level_images(Arc::clone(&source), &region, &[1.0])[0];
+        let light = |x: f64, y: f64| {
+            let texel = level.row(y.clamp(0.0, 6.0) as usize, x.clamp(0.0, 8.0) as usize, 1);
+            DVec2::from([0, 2].map(|c| f64::from(color::byte_to_light()[usize::from(texel[c])])))
+        };
+        for at in [[4.25, 3.75], [4.5, 3.0], [0.25, 0.5], [8.75, 6.5], [5.0, -2.0], [12.0, 3.5]] {
+            let at = DVec2::from(at);
+            // From beyond the image its border is seen.
+            let near = at.clamp(DVec2::ZERO, DVec2::new(9.0, 7.0));
+            let parts = (0..64).flat_map(|i| (0..64).map(move |j| (i, j)));
+            let mean = parts
+                .map(|(i, j)| {
+                    let step = |part: i32| (f64::from(part) + 0.5) / 32.0 - 1.0;
+                    light(near.x + step(i), near.y + step(j))
+                })
+                .sum::<DVec2>()
+                / 4096.0;
+            let found = level.sampler().mean_at(at);
+            assert!((f64::from(found.x) - mean.x).abs() < 1e-4, "{at} {found} {mean}");
+            assert!((f64::from(found.z) - mean.y).abs() < 1e-4, "{at} {found} {mean}");
+        }
     }
 
     #[test]

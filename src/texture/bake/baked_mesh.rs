@@ -3,7 +3,8 @@
 use rustc_hash::FxHashMap;
 
 use super::flat::flat_charts;
-use super::paint::Away;
+use super::nearby::Nearby;
+use super::paint::Brushes;
 use crate::mesh::Mesh;
 use crate::texture::block::BlockTextures;
 use crate::texture::level::LevelImage;
@@ -31,8 +32,9 @@ impl BlockTextures<'_> {
             .filter(|(_, triangle)| self.classes.of(mesh.triangle_material(**triangle)).is_some())
             .map(|(number, _)| number)
             .collect();
-        let charts =
-            flat_charts(mesh, &members, |triangles| self.scale_of(source, mesh, triangles, level));
+        let nearby = Nearby::of(source, mesh, &members);
+        let scale_of = |triangles: &[u32]| self.scale_of(&nearby, mesh, triangles, level);
+        let charts = flat_charts(mesh, &members, scale_of);
         let factor = self.fitted(mesh, &charts, level);
         let mut baked = BakedMesh {
             mesh: mesh.clone(),
@@ -40,10 +42,10 @@ impl BlockTextures<'_> {
             images: Vec::with_capacity(charts.len()),
         };
         let mut copies: FxHashMap<(u32, u32), u32> = FxHashMap::default();
-        let mut away = Away::new(source, mesh);
+        let mut brushes = Brushes::new(nearby);
         for (number, chart) in (0u32..).zip(&charts) {
             let scale = chart.scale * factor;
-            let painted = self.paint(source, mesh, chart, scale, level, &mut away);
+            let painted = self.paint(source, mesh, chart, scale, level, &mut brushes);
             for (&triangle, texels) in chart.triangles.iter().zip(&painted.corners) {
                 for (corner, texel) in texels.iter().enumerate() {
                     let vertex = baked.mesh.triangles[triangle as usize][corner];

@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::chart_plane::ChartPlane;
 use super::planar::{PlanarChart, planar_charts};
 use crate::mesh::{Mesh, wide};
 
@@ -14,6 +15,8 @@ pub(super) struct FlatChart {
     pub corners: Vec<[DVec2; 3]>,
     /// The greatest coordinates, metres.
     pub size: DVec2,
+    /// One sample a metre, from the least coordinates on.
+    pub plane: ChartPlane,
     /// Texels a metre that it should have.
     pub scale: f64,
 }
@@ -55,19 +58,20 @@ impl FlatChart {
     /// A chart seen along its normal, and the triangles that would lie on others.
     fn new(mesh: &Mesh, chart: PlanarChart, scale: f64) -> (Self, Vec<u32>) {
         let [right, up] = axes(mesh, &chart);
-        let flatten = |vertex: u32| {
-            let point = wide(mesh.positions[vertex as usize]);
-            DVec2::new(point.dot(right), point.dot(up))
-        };
+        let normal = right.cross(up);
+        let plane = ChartPlane { right, up, normal, origin: DVec2::ZERO, scale: 1.0 };
+        let flatten = |vertex: u32| plane.project(wide(mesh.positions[vertex as usize])).truncate();
         let corners: Vec<[DVec2; 3]> = chart
             .triangles
             .iter()
             .map(|&number| mesh.triangles[number as usize].map(flatten))
             .collect();
-        let mut flat = Self { triangles: chart.triangles, corners, size: DVec2::ZERO, scale };
+        let triangles = chart.triangles;
+        let mut flat = Self { triangles, corners, size: DVec2::ZERO, plane, scale };
         let above = flat.take_overlaps();
         let all = || flat.corners.iter().flatten();
         let low = all().fold(DVec2::INFINITY, |low, &corner| low.min(corner));
+        flat.plane.origin = low;
         flat.corners.iter_mut().flatten().for_each(|corner| *corner -= low);
         flat.size =
             flat.corners.iter().flatten().fold(DVec2::ZERO, |high, &corner| high.max(corner));

@@ -1,21 +1,27 @@
 //! Textures for nodes that were simplified without regard to texture seams.
 //!
 //! Such a node has no texture coordinates. Its triangles are gathered to planar charts
-//! ([`planar`]), laid flat ([`flat`]), and each texel takes the colour of what of the original lies
-//! nearest above or below it ([`project`]), or where nothing does, of the point nearest to it
-//! ([`source`]), at the resolution of the node's level. The charts' images then go the way of all
-//! others, into an atlas with gutters.
+//! ([`planar`]) and laid flat ([`flat`]). Tile by tile ([`tile`]), what of the original lies nearest
+//! above or below each sample is drawn ([`project`]) onto the chart's triangles ([`facet`]) and gives
+//! the sample its colour ([`shading`]), at the resolution of the node's level; a texel over which
+//! nothing lies takes the colour of the point nearest to it ([`source`]). The charts' images then go
+//! the way of all others, into an atlas with gutters.
 
 mod baked_mesh;
+mod chart_plane;
 pub(super) mod classes;
+mod facet;
 mod flat;
+mod nearby;
 mod paint;
 pub(super) mod plan;
 mod planar;
 mod project;
+mod shading;
 pub(super) mod source;
 #[cfg(test)]
 mod tests;
+mod tile;
 
 pub use baked_mesh::BakedMesh;
 pub use classes::BakeClasses;

@@ -4,16 +4,34 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3, Vec3, Vec4};
 
+use super::facet::Facet;
 use super::flat::{FlatChart, for_centres};
-use super::project::{Projection, Shown, TexelPlane};
-use super::source::{Source, SourceTriangle, SurfacePoint};
+use super::nearby::Nearby;
+use super::project::Projection;
+use super::shading::{Samples, tint};
+use super::source::{Source, SurfacePoint};
+use super::tile::Tile;
 use crate::color;
-use crate::mesh::{Mesh, wide};
+use crate::mesh::Mesh;
 use crate::texture::bits::BitGrid;
-use crate::texture::block::{BlockTextures, Prepared};
+use crate::texture::block::BlockTextures;
 use crate::texture::fill;
-use crate::texture::level::{LevelImage, Sampler};
+use crate::texture::level::LevelImage;
 use crate::texture::raster::Rasterizer;
+
+/// What painting needs of a node, and memory that its charts use one after another.
+pub(super) struct Brushes {
+    nearby: Nearby,
+    tile: Tile,
+    projection: Projection,
+}
+
+impl Brushes {
+    /// To paint charts of a mesh.
+    pub fn new(nearby: Nearby) -> Self {
+        Self { nearby, tile: Tile::default(), projection: Projection::default() }
+    }
+}
 
 /// A chart's image.
 pub(super) struct Painted {
@@ -45,8 +63,20 @@ const BESIDE: f64 = 1.5;
 /// others.
 const SAMPLES: [usize; 2] = [4, 2];
 
-/// So many samples are drawn at once, about: half a megabyte.
-const BAND: usize = 1 << 16;
+/// Where triangles of the original have at least so many samples, fewer samples of a texel that are
+/// means of two by two texels each are as good.
+const SAMPLES_PER_TRIANGLE: f64 = 16.0;
+
+/// How a texel is sampled.
+struct Sampling {
+    /// Samples along each side.
+    side: usize,
+    /// Each is the mean of two by two texels of the level that it is taken from.
+    wide: bool,
+}
+
+/// So many samples along each side are drawn at once: what is written takes 200 KB.
+const TILE: usize = 128;
 
 /// Times that the scale is fitted to the texels that a node may have.
 const FITS: usize = 4;
@@ -65,25 +95,12 @@ impl BlockTextures<'_> {
     /// the level's resolution.
     pub(super) fn scale_of(
         &self,
-        source: &Source,
+        nearby: &Nearby,
         mesh: &Mesh,
         triangles: &[u32],
         level: usize,
     ) -> f64 {
-        let (mut texels, mut area) = (0.0, 0.0);
-        let mut near = None;
-        for &triangle in triangles {
-            let [a, b, c] = mesh.corners(mesh.triangles[triangle as usize]);
-            let cross = (b - a).cross(c - a);
-            let normal = cross.normalize_or_zero();
-            let Some(nearest) = source.nearest((a + b + c) / 3.0, normal, near, 0.0) else {
-                continue;
-            };
-            near = Some(nearest);
-            texels += source.triangle(nearest.triangle).density * cross.length();
-            area += cross.length();
-        }
-        if area > 0.0 { (texels / area).sqrt() / self.steps[level] } else { 0.0 }
+        nearby.density(mesh, triangles).sqrt() / self.steps[level]
     }
 
     /// What the charts' scales are multiplied with so that with their gutters they take no more
@@ -95,13 +112,17 @@ impl BlockTextures<'_> {
         let longest = charts.iter().map(|chart| chart.size.max_element() * chart.scale);
         let most = (self.options.max_atlas as f64 * 0.5).max(1.0);
         let mut factor = (most / longest.fold(most, f64::max)).min(1.0);
+        let inside: f64 = charts.iter().map(|chart| chart.area() * chart.scale.powi(2)).sum();
         for _ in 0..FITS {
             let taken: f64 =
                 charts.iter().map(|chart| chart.texels(chart.scale * factor, cell)).sum();
             if taken <= share {
                 break;
             }
-            factor *= (share / taken).sqrt().max(0.5);
+            // What is around the triangles grows with their sides, not with their areas.
+            let around = (taken / factor - inside * factor).max(0.0);
+            let root = (around * around + 4.0 * inside * share).sqrt();
+            factor = (2.0 * share / (around + root)).clamp(factor * 0.5, factor);
             if factor < LEAST_SCALE {
                 factor = LEAST_SCALE;
                 break;
@@ -118,69 +139,64 @@ impl BlockTextures<'_> {
         chart: &FlatChart,
         scale: f64,
         level: usize,
-        away: &mut Away,
+        Brushes { nearby, tile, projection }: &mut Brushes,
     ) -> Painted {
-        let (corners, size) = chart.on_texels(scale, self.baked_cell(level));
+        let cell = self.baked_cell(level);
+        let (corners, size) = chart.on_texels(scale, cell);
         let [width, height] = size;
         let owners = owners(&corners, size);
         let mut pixels = vec![0u8; width * height * 3];
         let mut known = BitGrid::new(width, height);
         // Bilinear sampling of the next finer level averages just the texel's own width.
         let finer = (level + 1).min(self.steps.len() - 1);
-        let samples = self.samples(scale / chart.scale, level);
-        let mut projection = Projection::default();
+        let triangles = nearby.triangles(mesh, &chart.triangles);
+        let Sampling { side: samples, wide } = self.sampling(scale / chart.scale, level, triangles);
+        let plane = chart.plane.of_texels(scale, margin(cell)).of_samples(samples);
+        let facets: Vec<Option<Facet>> = chart
+            .triangles
+            .iter()
+            .map(|&triangle| {
+                let triangle = mesh.triangles[triangle as usize];
+                let reach = 2.0 * nearby.farthest(triangle) + REACH_TEXELS / scale;
+                Facet::new(&plane, mesh, triangle, reach, BESIDE * samples as f64)
+            })
+            .collect();
         let byte = color::linear_to_byte();
         let mut near = None;
         let mut sums: Vec<Vec4> = Vec::new();
-        for (number, (&triangle, &flat)) in (0..).zip(chart.triangles.iter().zip(&corners)) {
-            let triangle = mesh.triangles[triangle as usize];
-            let sampled = flat.map(|corner| corner * samples as f64);
-            let plane = TexelPlane::new(mesh, triangle, sampled, BESIDE * samples as f64);
-            let mut reach = 0.0;
-            if let Some(plane) = &plane {
-                let farthest = triangle.map(|vertex| away.of(vertex, plane.normal));
-                reach = 2.0 * farthest.into_iter().fold(0.0, f64::max) + REACH_TEXELS / scale;
-                projection.gather(source, plane, reach);
-            }
-            // What has no area in texels, as where the source has none, shows its middle.
-            let [a, b, c] = mesh.corners(triangle);
-            let normal = (b - a).cross(c - a).normalize_or_zero();
-            let [columns, rows] = texels_around(flat, size);
-            let band = (BAND / (columns.len() * samples * samples).max(1)).max(1);
-            for first in rows.clone().step_by(band) {
-                let rows = first..(first + band).min(rows.end);
-                if let Some(plane) = &plane {
-                    let sampled = [columns.clone(), rows.clone()]
-                        .map(|Range { start, end }| start * samples..end * samples);
-                    projection.draw(source, plane, reach, sampled, &self.steps);
-                }
-                for y in rows {
-                    let owned = &owners[y * width..][..width];
-                    sums.clear();
-                    sums.resize(columns.len(), Vec4::ZERO);
-                    if plane.is_some() {
-                        let texels = (columns.clone(), y, samples);
-                        let is_own = |x: usize| owned[x] == number;
-                        self.add_samples(source, &projection, texels, is_own, &mut sums);
+        let owned = |y: usize| &owners[y * width..][..width];
+        for [columns, rows] in tiles(size, (TILE / samples).max(1)) {
+            tile.fill([columns.clone(), rows.clone()], samples, owned, &facets);
+            projection.draw(source, &plane, tile, &facets);
+            let shown = Samples::new(self, source, tile, projection, wide);
+            for y in rows {
+                sums.clear();
+                sums.resize(columns.len(), Vec4::ZERO);
+                shown.add(y * samples, samples, &mut sums);
+                for (x, sum) in columns.clone().zip(&sums) {
+                    let owner = owners[y * width + x];
+                    if owner == FREE {
+                        continue;
                     }
-                    for (x, sum) in columns.clone().zip(&sums) {
-                        if owned[x] != number {
-                            continue;
-                        }
-                        let drawn = (sum.w > 0.0).then(|| sum.truncate() / sum.w);
-                        let mut searched = || {
-                            let centre =
-                                DVec2::new(x as f64 + 0.5, y as f64 + 0.5) * samples as f64;
-                            let point =
-                                plane.as_ref().map_or((a + b + c) / 3.0, |plane| plane.at(centre));
-                            near = source.nearest(point, normal, near, SLACK / scale).or(near);
-                            Some(self.color_at(source, near?, finer))
+                    let mut searched = || {
+                        let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5) * samples as f64;
+                        let corners =
+                            mesh.corners(mesh.triangles[chart.triangles[owner as usize] as usize]);
+                        // What has no area in texels, as where the source has none, shows its middle.
+                        let point = match &facets[owner as usize] {
+                            Some(facet) => plane.at(centre, facet.height(centre)),
+                            None => corners.into_iter().sum::<DVec3>() / 3.0,
                         };
-                        let Some(color) = drawn.or_else(&mut searched) else { continue };
-                        let bytes = color.to_array().map(|light| byte.of((light * 65535.0) as u16));
-                        pixels[(y * width + x) * 3..][..3].copy_from_slice(&bytes);
-                        known.set(x, y);
-                    }
+                        let [a, b, c] = corners;
+                        let normal = (b - a).cross(c - a).normalize_or_zero();
+                        near = source.nearest(point, normal, near, SLACK / scale).or(near);
+                        Some(self.color_at(source, near?, finer))
+                    };
+                    let drawn = (sum.w > 0.0).then(|| sum.truncate() / sum.w);
+                    let Some(color) = drawn.or_else(&mut searched) else { continue };
+                    let bytes = color.to_array().map(|light| byte.of((light * 65535.0) as u16));
+                    pixels[(y * width + x) * 3..][..3].copy_from_slice(&bytes);
+                    known.set(x, y);
                 }
             }
         }
@@ -188,58 +204,14 @@ impl BlockTextures<'_> {
         Painted { image: LevelImage::own(size, 3, self.steps[level], pixels), corners }
     }
 
-    /// Samples along each side of a texel of a chart that has so many texels for one of its level.
-    fn samples(&self, factor: f64, level: usize) -> usize {
+    /// How texels are sampled of a chart which has so many texels for one of its level, and for whose
+    /// source texels there are so many triangles of the original.
+    fn sampling(&self, factor: f64, level: usize, triangles: f64) -> Sampling {
         let source_texels = self.steps[level] / factor.max(f64::MIN_POSITIVE);
-        (source_texels.round() as usize).clamp(1, SAMPLES[usize::from(level > 0)])
-    }
-
-    /// Adds what the samples of those texels of a row show that are asked for, linear light, 0–1,
-    /// and how many show anything.
-    fn add_samples(
-        &self,
-        source: &Source,
-        projection: &Projection,
-        (columns, y, samples): (Range<usize>, usize, usize),
-        is_own: impl Fn(usize) -> bool,
-        sums: &mut [Vec4],
-    ) {
-        // Most samples show what the one before them shows.
-        let mut before: Option<(u32, Shading)> = None;
-        for row in y * samples..(y + 1) * samples {
-            for (x, sum) in columns.clone().zip(&mut *sums).filter(|&(x, _)| is_own(x)) {
-                for column in x * samples..(x + 1) * samples {
-                    let Some((number, shown)) = projection.at(column, row) else { continue };
-                    let shading = match &before {
-                        Some((same, shading)) if *same == number => shading,
-                        _ => &before.insert((number, self.shading(source, shown))).1,
-                    };
-                    let [column, row] = [column as i32, row as i32].map(f64::from);
-                    *sum += shading.at(DVec2::new(column + 0.5, row + 0.5));
-                }
-            }
-        }
-    }
-
-    /// What gives samples of a triangle of the original their colours.
-    fn shading<'a>(&'a self, source: &Source, shown: &'a Shown) -> Shading<'a> {
-        let triangle = source.triangle(shown.triangle);
-        let image = self.levels_of(triangle).map(|levels| &levels[shown.level as usize]);
-        let step = image.map_or(1.0, |image| image.step);
-        Shading {
-            sampler: image.map(LevelImage::sampler),
-            texels: shown.texels(1.0 / step),
-            shown,
-            colors: triangle.colors,
-        }
-    }
-
-    /// The images of a triangle of the original, by level; `None` where it has no texture.
-    fn levels_of(&self, triangle: &SourceTriangle) -> Option<&[LevelImage]> {
-        match self.textures.get(triangle.texture as usize) {
-            Some(Prepared::Atlas(atlas)) => Some(&atlas.levels),
-            _ => None,
-        }
+        let most = (source_texels.round() as usize).clamp(1, SAMPLES[usize::from(level > 0)]);
+        let wanted = source_texels * (SAMPLES_PER_TRIANGLE * triangles).sqrt();
+        let side = (wanted.ceil() as usize).clamp(1, most);
+        Sampling { side, wide: side < most }
     }
 
     /// What the original shows at a point, at the level's resolution, linear light, 0–1.
@@ -255,62 +227,10 @@ impl BlockTextures<'_> {
     }
 }
 
-/// What gives samples of one triangle of the original their colours.
-struct Shading<'a> {
-    /// `None` where the triangle has no texture.
-    sampler: Option<Sampler<'a>>,
-    /// The position in its image of the origin of the chart, and by column and row.
-    texels: [DVec2; 3],
-    shown: &'a Shown,
-    colors: Option<[[u16; 4]; 3]>,
-}
-
-impl Shading<'_> {
-    /// The colour of a sample, and 1.
-    #[inline]
-    fn at(&self, centre: DVec2) -> Vec4 {
-        let Some(sampler) = &self.sampler else { return Vec4::ONE };
-        let [origin, right, down] = self.texels;
-        let light = sampler.at(origin + right * centre.x + down * centre.y);
-        light * tint(self.colors, || self.shown.weights(centre))
-    }
-}
-
-/// The vertex colours of a triangle's corners, weighted, and 1.
-fn tint(colors: Option<[[u16; 4]; 3]>, weights: impl Fn() -> [f64; 3]) -> Vec4 {
-    let Some(colors) = colors else { return Vec4::ONE };
-    let weights = weights();
-    let channel = |channel: usize| {
-        let own = (0..3).map(|i| weights[i] * f64::from(colors[i][channel])).sum::<f64>();
-        (own / 65535.0) as f32
-    };
-    Vec4::new(channel(0), channel(1), channel(2), 1.0)
-}
-
-/// How far the original is from a node's vertices.
-pub(super) struct Away<'a> {
-    source: &'a Source,
-    mesh: &'a Mesh,
-    /// By vertex; negative where nobody has asked yet.
-    known: Vec<f64>,
-    near: Option<SurfacePoint>,
-}
-
-impl<'a> Away<'a> {
-    pub fn new(source: &'a Source, mesh: &'a Mesh) -> Self {
-        Self { source, mesh, known: vec![-1.0; mesh.positions.len()], near: None }
-    }
-
-    /// The distance of a vertex, metres, seen from a triangle that faces this way.
-    fn of(&mut self, vertex: u32, normal: DVec3) -> f64 {
-        let known = &mut self.known[vertex as usize];
-        if *known < 0.0 {
-            let point = wide(self.mesh.positions[vertex as usize]);
-            self.near = self.source.nearest(point, normal, self.near, 0.0).or(self.near);
-            *known = self.near.map_or(0.0, |near| near.distance);
-        }
-        *known
-    }
+/// Columns and rows of an image, in squares with so many texels a side.
+fn tiles([width, height]: [usize; 2], side: usize) -> impl Iterator<Item = [Range<usize>; 2]> {
+    let along = move |end: usize| (0..end).step_by(side).map(move |at| at..(at + side).min(end));
+    along(height).flat_map(move |rows| along(width).map(move |columns| [columns, rows.clone()]))
 }
 
 impl FlatChart {
@@ -326,6 +246,12 @@ impl FlatChart {
         (corners, size.map(|side| (side.ceil() as usize).max(1)))
     }
 
+    /// Square metres.
+    fn area(&self) -> f64 {
+        let doubled = |[a, b, c]: &[DVec2; 3]| (b - a).perp_dot(c - a).abs();
+        self.corners.iter().map(doubled).sum::<f64>() * 0.5
+    }
+
     /// The texels of the cells that it takes.
     fn texels(&self, scale: f64, cell: usize) -> f64 {
         let (corners, size) = self.on_texels(scale, cell);
@@ -335,15 +261,6 @@ impl FlatChart {
         Rasterizer::default().mark_all(corners.iter().map(|t| t.map(cells)), &mut grid);
         (grid.count() * (cell * cell) as u64) as f64
     }
-}
-
-/// Columns and rows of the texels that may show a triangle with these corners.
-fn texels_around([a, b, c]: [DVec2; 3], size: [usize; 2]) -> [Range<usize>; 2] {
-    let (low, high) = (a.min(b).min(c) - BESIDE, a.max(b).max(c) + BESIDE);
-    [0, 1].map(|axis| {
-        let first = (low[axis].max(0.0) as usize).min(size[axis]);
-        first..(high[axis].ceil().max(0.0) as usize).clamp(first, size[axis])
-    })
 }
 
 /// For each texel the triangle that it shows: the one that its centre lies in, or beside it one
@@ -369,18 +286,26 @@ fn owners(corners: &[[DVec2; 3]], size: [usize; 2]) -> Vec<u32> {
         }
     }
     // Once along each row, then along each column: a ring of one texel.
-    for [dx, dy] in [[1, 0], [0, 1]] {
-        let before = owners.clone();
-        for y in 0..height {
-            for x in 0..width {
-                if before[y * width + x] != FREE {
-                    continue;
-                }
-                let back = (x >= dx && y >= dy).then(|| before[(y - dy) * width + x - dx]);
-                let ahead =
-                    (x + dx < width && y + dy < height).then(|| before[(y + dy) * width + x + dx]);
-                let found = [back, ahead].into_iter().flatten().find(|&owner| owner != FREE);
-                owners[y * width + x] = found.unwrap_or(FREE);
+    for row in owners.chunks_exact_mut(width) {
+        let mut before = FREE;
+        for x in 0..width {
+            let own = row[x];
+            if own == FREE {
+                let after = row.get(x + 1).copied().unwrap_or(FREE);
+                row[x] = if before == FREE { after } else { before };
+            }
+            before = own;
+        }
+    }
+    let mut above = vec![FREE; width];
+    for y in 0..height {
+        let (own, below) = owners[y * width..].split_at_mut(width);
+        let last = y + 1 == height;
+        for (x, (own, above)) in own.iter_mut().zip(&mut above).enumerate() {
+            let before = std::mem::replace(above, *own);
+            if *own == FREE {
+                let after = if last { FREE } else { below[x] };
+                *own = if before == FREE { after } else { before };
             }
         }
     }

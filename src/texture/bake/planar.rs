@@ -3,7 +3,7 @@
 //! A chart grows from the largest free triangle over the neighbour that faces most its way. No
 //! triangle of it is seen at a steeper angle than [`LEAST_FACING`] allows, so a chart is distorted
 //! little and never folded over an edge. That parts of it do not come to lie on each other from
-//! afar is looked after where it is drawn ([`super::layout`]).
+//! afar is looked after where it is drawn ([`super::flat`]).
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;

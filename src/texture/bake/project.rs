@@ -1,99 +1,33 @@
-//! Draws the original onto a coarse triangle along its normal: what lies nearest above or below
-//! each texel, found triangle by triangle as a rasteriser does rather than texel by texel.
+//! Draws the original onto the triangles of a flat chart along their normals: what lies nearest
+//! above or below each sample, found triangle by triangle as a rasteriser does.
+//!
+//! A chart is drawn tile by tile, so that what is written stays in the cache. What of the original
+//! is near a tile is searched for and fetched once for all of the chart's triangles there.
 
 use std::ops::Range;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3A};
 
+use super::chart_plane::ChartPlane;
+use super::facet::Facet;
 use super::source::Source;
-use crate::mesh::{Mesh, wide};
+use super::tile::{Member, Tile};
 
-/// Triangles of the original whose normal has a smaller cosine with the coarse one's are seen from
-/// their edge and show nothing.
+/// Triangles of the original whose normal has a smaller cosine with the chart's are seen from their
+/// edge and show nothing.
 const LEAST_SEEN: f64 = 1e-3;
 
-/// What a chart's texel shows is taken from a level whose texels are at most so large for it:
-/// bilinear sampling averages about two of them along each axis.
-const NARROWER: f64 = 0.6;
+/// A centre that rounding puts this far beside a triangle, in samples, still lies in it.
+const SLACK: f64 = 1e-6;
 
-/// Between texels of a chart and points of a triangle's plane.
-pub(super) struct TexelPlane {
-    /// The point of texel (0, 0), and by how much it moves with each texel.
-    origin: DVec3,
-    along: [DVec3; 2],
-    /// Gives texels when multiplied with a point's offset from `origin`.
-    inverse: [DVec3; 2],
-    /// Unit length.
-    pub normal: DVec3,
-    corners: [DVec3; 3],
-    flat: [DVec2; 3],
-    /// How many texels around the triangle are seen.
-    beside: f64,
-}
-
-impl TexelPlane {
-    /// The plane of a triangle whose corners lie on these texels, and of so many texels around it;
-    /// `None` where it has hardly any area in space or in texels.
-    pub fn new(mesh: &Mesh, triangle: [u32; 3], flat: [DVec2; 3], beside: f64) -> Option<Self> {
-        let corners = triangle.map(|vertex| wide(mesh.positions[vertex as usize]));
-        let [a, b, c] = flat;
-        let doubled = (b - a).perp_dot(c - a);
-        let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        let normal = cross.normalize_or_zero();
-        if doubled.abs() <= 1e-6 || normal == DVec3::ZERO {
-            return None;
-        }
-        let (p, q) = (corners[1] - corners[0], corners[2] - corners[0]);
-        let along =
-            [(p * (c - a).y - q * (b - a).y) / doubled, (q * (b - a).x - p * (c - a).x) / doubled];
-        let origin = corners[0] - along[0] * a.x - along[1] * a.y;
-        // The plane's dual basis.
-        let [right, up] = along;
-        let volume = right.cross(up).dot(normal);
-        let inverse = [up.cross(normal) / volume, normal.cross(right) / volume];
-        let finite = inverse.iter().all(|side| side.is_finite());
-        finite.then_some(Self { origin, along, inverse, normal, corners, flat, beside })
-    }
-
-    /// The point of a texel.
-    pub fn at(&self, texel: DVec2) -> DVec3 {
-        self.origin + self.along[0] * texel.x + self.along[1] * texel.y
-    }
-
-    /// The texel that a point lies over.
-    fn texel(&self, point: DVec3) -> DVec2 {
-        let offset = point - self.origin;
-        DVec2::new(self.inverse[0].dot(offset), self.inverse[1].dot(offset))
-    }
-
-    /// The box of what lies within `reach` along the normal.
-    fn bounds(&self, reach: f64) -> (DVec3, DVec3) {
-        let [a, b, c] = self.corners;
-        let aside = (self.along[0].abs() + self.along[1].abs()) * self.beside;
-        let grown = self.normal.abs() * reach + aside;
-        (a.min(b).min(c) - grown, a.max(b).max(c) + grown)
-    }
-
-    /// Its sides as half planes: a texel lies in the triangle or no farther beside it than is seen
-    /// where `[0] + x * [1] + y * [2]` is at least 0 for each.
-    fn sides(&self) -> [[f64; 3]; 3] {
-        let [a, b, c] = self.flat;
-        let turn = (b - a).perp_dot(c - a).signum();
-        [(a, b), (b, c), (c, a)].map(|(from, to)| {
-            let inward = (to - from).perp() * turn;
-            let beside = self.beside * (inward.x.abs() + inward.y.abs());
-            [beside - inward.dot(from), inward.x, inward.y]
-        })
-    }
-}
-
-/// What a texel shows: a triangle of the original, and where in its image texel (x, y) of the chart
-/// lies: `at + x * along[0] + y * along[1]`.
+/// What a sample shows: a triangle of the original, and where in its image sample (x, y) of the
+/// chart lies: `at + x * along[0] + y * along[1]`, source texels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shown {
     pub triangle: u32,
-    /// The level whose texels are as large as those of the chart, or the next finer one.
-    pub level: u32,
+    /// By how much the position moves from one sample to the next, source texels, along rows or
+    /// columns, whichever is more.
+    pub spacing: f64,
     at: DVec2,
     along: [DVec2; 2],
     /// The weights of the triangle's second and third corner likewise.
@@ -107,24 +41,178 @@ impl Shown {
         [self.at, self.along[0], self.along[1]].map(|texels| texels * scale)
     }
 
-    /// The weights of the triangle's corners at a texel of the chart.
+    /// The weights of the triangle's corners at a sample of the chart.
     pub fn weights(&self, at: DVec2) -> [f64; 3] {
         let [v, w] = self.weights.map(|[first, x, y]| first + x * at.x + y * at.y);
         [1.0 - v - w, v, w]
     }
 }
 
-/// Some texels around one coarse triangle, and what they show; kept between triangles.
+/// What the samples of one tile show; kept between tiles for its memory.
 #[derive(Default)]
 pub(super) struct Projection {
-    columns: [usize; 2],
-    rows: [usize; 2],
-    /// By texel of the box: the weighted distance of what it shows, and its number in `shown`.
-    nearest: Vec<(f32, u32)>,
-    shown: Vec<Shown>,
-    candidates: Vec<u32>,
-    /// By row of the box: the first column that may be seen, and the last.
-    spans: Vec<[f64; 2]>,
+    /// By sample of the tile: the weighted distance of what it shows, metres.
+    nearest: Vec<f32>,
+    /// By sample of the tile: the number in `shown` of what it shows, or one beyond all.
+    pub numbers: Vec<u32>,
+    pub shown: Vec<Shown>,
+    found: Vec<u32>,
+    candidates: Vec<Candidate>,
+}
+
+/// A triangle of the original near a tile.
+struct Candidate {
+    number: u32,
+    /// In samples and metres over the chart.
+    corners: [DVec3; 3],
+    low: Vec3A,
+    high: Vec3A,
+}
+
+/// Nothing lies over the sample.
+const NOTHING: u32 = u32::MAX;
+
+impl Projection {
+    /// Draws what of `source` lies within reach of a tile's triangles.
+    pub fn draw(
+        &mut self,
+        source: &Source,
+        plane: &ChartPlane,
+        tile: &Tile,
+        facets: &[Option<Facet>],
+    ) {
+        self.nearest.clear();
+        self.nearest.resize(tile.owners.len(), f32::INFINITY);
+        self.numbers.clear();
+        self.numbers.resize(tile.owners.len(), NOTHING);
+        self.shown.clear();
+        let facet_of = |member: &Member| facets[member.number as usize].as_ref();
+        let all = tile.members.iter().filter_map(|member| Some(member.bounds(facet_of(member)?)));
+        let around = all.reduce(|[low, high], [l, h]| [low.min(l), high.max(h)]);
+        let Some(around) = around else { return };
+        self.gather(source, plane, around);
+        for member in &tile.members {
+            let Some(facet) = facet_of(member) else { continue };
+            let [low, high] = member.bounds(facet);
+            for index in 0..self.candidates.len() {
+                let candidate = &self.candidates[index];
+                if !(candidate.low.cmpgt(high) | candidate.high.cmplt(low)).any() {
+                    self.draw_one(source, index, facet, member, tile);
+                }
+            }
+        }
+    }
+
+    /// Finds the triangles of the original that may meet a box in samples and metres over the chart.
+    fn gather(&mut self, source: &Source, plane: &ChartPlane, [low, high]: [Vec3A; 2]) {
+        self.found.clear();
+        let [from, to] = plane.box_around(low.as_dvec3(), high.as_dvec3());
+        source.in_box(from, to, |triangle| self.found.push(triangle));
+        // Of equally near ones the first is shown, whatever the order of the search.
+        self.found.sort_unstable();
+        self.candidates.clear();
+        for &number in &self.found {
+            let corners = source.corners(number).map(|corner| plane.project(corner));
+            let [a, b, c] = corners.map(|corner| corner.as_vec3a());
+            let (own_low, own_high) = (a.min(b).min(c), a.max(b).max(c));
+            if !(own_low.cmpgt(high) | own_high.cmplt(low)).any() {
+                self.candidates.push(Candidate { number, corners, low: own_low, high: own_high });
+            }
+        }
+    }
+
+    /// Draws a candidate onto the samples of one triangle of the chart.
+    fn draw_one(
+        &mut self,
+        source: &Source,
+        candidate: usize,
+        facet: &Facet,
+        member: &Member,
+        tile: &Tile,
+    ) {
+        let Candidate { number, corners, .. } = self.candidates[candidate];
+        let triangle = source.triangle(number);
+        let cosine = triangle.normal.dot(facet.normal);
+        if cosine.abs() < LEAST_SEEN {
+            return;
+        }
+        let [(a, p), (b, q), (c, r)] = corners.map(|corner| facet.project(corner));
+        if facet.is_beside([a, b, c]) {
+            return;
+        }
+        // Samples whose centre lies in the box.
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let centres = |low: f64, high: f64, range: &Range<usize>| {
+            let [first, end] = [range.start as f64, range.end as f64];
+            let from = up((low - 0.5 - SLACK).clamp(first, end));
+            // One after the last that is not above.
+            from..(high + 0.5 + SLACK).clamp(from as f64, end) as i32 as usize
+        };
+        let columns = centres(low.x, high.x, &member.columns);
+        let rows = centres(low.y, high.y, &member.rows);
+        let doubled = (b - a).perp_dot(c - a);
+        if columns.is_empty() || rows.is_empty() || doubled == 0.0 {
+            return;
+        }
+        // Everything is linear in samples: at the origin, by column, by row.
+        let (ab, ac) = ((b - a) / doubled, (c - a) / doubled);
+        let linear = |slopes: DVec2| -> [f64; 3] {
+            [-(slopes.x * a.x + slopes.y * a.y), slopes.x, slopes.y]
+        };
+        let weights = [linear(DVec2::new(ac.y, -ac.x)), linear(DVec2::new(-ab.y, ab.x))];
+        let combine = |first: f64, second: f64, third: f64| -> [f64; 3] {
+            let rises = [second - first, third - first];
+            std::array::from_fn(|i| {
+                let own = if i == 0 { first } else { 0.0 };
+                own + weights[0][i] * rises[0] + weights[1][i] * rises[1]
+            })
+        };
+        let above = combine(p, q, r);
+        let weight = Source::weight(cosine) as f32;
+        let (reach, slope) = (facet.reach as f32, above[1] as f32);
+        let edges = Edges::new([a, b, c]);
+        let range = [columns.start as f64, columns.end as f64 - 1.0];
+        let mut own = NOTHING;
+        for y in rows {
+            let middle = y as f64 + 0.5;
+            let [from, to] = edges.span(middle, range);
+            if from > to {
+                continue;
+            }
+            let (from, to) = (up(from), to as i32 as usize);
+            let count = (to + 1).saturating_sub(from);
+            let start = (above[0] + above[2] * middle + above[1] * (from as f64 + 0.5)) as f32;
+            let first = tile.index(from, y);
+            let samples = first..first + count;
+            let owners = &tile.owners[samples.clone()];
+            let nearest = &mut self.nearest[samples.clone()];
+            let numbers = &mut self.numbers[samples];
+            let is_new = own == NOTHING;
+            let next = if is_new { self.shown.len() as u32 } else { own };
+            let mut some = false;
+            for (index, ((owner, nearest), number)) in
+                (0i32..).zip(owners.iter().zip(nearest).zip(numbers))
+            {
+                let distance = (start + slope * index as f32).abs();
+                let weighted = distance * weight;
+                let is_near = distance <= reach && weighted < *nearest;
+                let is_nearer = is_near && *owner == member.number;
+                *nearest = if is_nearer { weighted } else { *nearest };
+                *number = if is_nearer { next } else { *number };
+                some |= is_nearer;
+            }
+            if is_new && some {
+                own = next;
+                let [p, q, r] = triangle.texels.map(|at| DVec2::from(at.map(f64::from)));
+                let u = combine(p.x, q.x, r.x);
+                let v = combine(p.y, q.y, r.y);
+                let along = [DVec2::new(u[1], v[1]), DVec2::new(u[2], v[2])];
+                let spacing = along[0].length_squared().max(along[1].length_squared()).sqrt();
+                let at = DVec2::new(u[0], v[0]);
+                self.shown.push(Shown { triangle: number, spacing, at, along, weights });
+            }
+        }
+    }
 }
 
 /// The least whole number that is not below a value of 0 or more, of which i32 has enough and is
@@ -134,177 +222,51 @@ fn up(value: f64) -> usize {
     below as usize + usize::from(f64::from(below) < value)
 }
 
-/// The part of a range of columns whose centres have no negative value of any of three: each
-/// `start + slope * x`.
-fn span(values: [(f64, f64); 3], [mut from, mut to]: [f64; 2]) -> [f64; 2] {
-    for (start, slope) in values {
-        let crossing = -start / slope - 0.5;
-        if slope > 0.0 {
-            from = from.max(crossing);
-        } else if slope < 0.0 {
-            to = to.min(crossing);
-        } else if start < 0.0 {
-            to = -1.0;
-        }
-    }
-    [from, to]
+/// Where the sides of a triangle cross rows of samples: for a row at `y`, its centres lie between
+/// `[0] + y * [1]` of all on the left and of all on the right.
+struct Edges {
+    left: [[f64; 2]; 3],
+    right: [[f64; 2]; 3],
 }
 
-/// Nothing lies over the texel.
-const NOTHING: u32 = u32::MAX;
-
-impl Projection {
-    /// Gathers what of `source` lies within `reach` of a triangle, to be drawn.
-    pub fn gather(&mut self, source: &Source, plane: &TexelPlane, reach: f64) {
-        self.candidates.clear();
-        let (low, high) = plane.bounds(reach);
-        source.in_box(low, high, |triangle| self.candidates.push(triangle));
-        // Of equally near ones the first is shown, whatever the order of the search.
-        self.candidates.sort_unstable();
-    }
-
-    /// Draws what was gathered for a triangle onto these columns and rows of texels. `steps` are
-    /// source texels a texel, by level, the finest last.
-    pub fn draw(
-        &mut self,
-        source: &Source,
-        plane: &TexelPlane,
-        reach: f64,
-        texels: [Range<usize>; 2],
-        steps: &[f64],
-    ) {
-        [self.columns, self.rows] = texels.map(|Range { start, end }| [start, end]);
-        let count = [self.columns, self.rows].map(|[first, end]| end - first);
-        self.nearest.clear();
-        self.nearest.resize(count[0] * count[1], (f32::INFINITY, NOTHING));
-        self.shown.clear();
-        let sides = plane.sides();
-        self.spans.clear();
-        for y in self.rows[0]..self.rows[1] {
-            let [first, end] = self.columns.map(|column| column as f64);
-            let row = sides.map(|[at, x, slope]| (at + slope * (y as f64 + 0.5), x));
-            self.spans.push(span(row, [first, end - 1.0]));
-        }
-        for index in 0..self.candidates.len() {
-            let number = self.candidates[index];
-            self.draw_one(source, number, plane, &sides, reach, steps);
-        }
-    }
-
-    fn draw_one(
-        &mut self,
-        source: &Source,
-        number: u32,
-        plane: &TexelPlane,
-        sides: &[[f64; 3]; 3],
-        reach: f64,
-        steps: &[f64],
-    ) {
-        let (triangle, corners) = (source.triangle(number), source.corners(number));
-        let cosine = triangle.normal.dot(plane.normal);
-        if cosine.abs() < LEAST_SEEN {
-            return;
-        }
-        let [a, b, c] = corners.map(|corner| plane.texel(corner));
-        let doubled = (b - a).perp_dot(c - a);
-        if doubled == 0.0 {
-            return;
-        }
-        let is_beyond = |&[at, x, y]: &[f64; 3]| {
-            [a, b, c].iter().all(|corner| at + x * corner.x + y * corner.y < 0.0)
-        };
-        if sides.iter().any(is_beyond) {
-            return;
-        }
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        // Texels whose centre lies in the box.
-        let centres = |axis: usize, [first, end]: [usize; 2]| {
-            let from = up((low[axis] - 0.5).clamp(first as f64, end as f64));
-            // One after the last that is not above.
-            let to = (high[axis] + 0.5).clamp(from as f64, end as f64) as i32 as usize;
-            from..to
-        };
-        let (columns, rows) = (centres(0, self.columns), centres(1, self.rows));
-        if columns.is_empty() || rows.is_empty() {
-            return;
-        }
-        // Everything is linear in texels: first, by column, by row.
-        let linear = |origin: DVec2, slopes: DVec2, value: f64| {
-            [value - slopes.dot(origin), slopes.x, slopes.y]
-        };
-        let (ab, ac) = ((b - a) / doubled, (c - a) / doubled);
-        let weights =
-            [linear(a, DVec2::new(ac.y, -ac.x), 0.0), linear(a, DVec2::new(-ab.y, ab.x), 0.0)];
-        let weight = Source::weight(cosine);
-        let height = |point: DVec3| (point - plane.origin).dot(plane.normal) * weight;
-        let heights = corners.map(height);
-        let rises = [heights[1] - heights[0], heights[2] - heights[0]];
-        let combine = |first: f64, rises: [f64; 2]| -> [f64; 3] {
-            std::array::from_fn(|i| {
-                let own = if i == 0 { first } else { 0.0 };
-                own + weights[0][i] * rises[0] + weights[1][i] * rises[1]
-            })
-        };
-        let distance = combine(heights[0], rises);
-        let most = reach * weight;
-        let mut own = NOTHING;
-        for y in rows {
-            let row = (y - self.rows[0]) * (self.columns[1] - self.columns[0]);
-            let at = |value: [f64; 3]| value[0] + value[2] * (y as f64 + 0.5);
-            let starts = [at(weights[0]), at(weights[1]), at(distance)];
-            // The columns in which no weight is negative.
-            let seen = self.spans[y - self.rows[0]];
-            let range = [seen[0].max(columns.start as f64), seen[1].min(columns.end as f64 - 1.0)];
-            let [from, to] = span(
-                [
-                    (starts[0], weights[0][1]),
-                    (starts[1], weights[1][1]),
-                    (1.0 - starts[0] - starts[1], -weights[0][1] - weights[1][1]),
-                ],
-                range,
-            );
-            if from > to {
+impl Edges {
+    fn new([a, b, c]: [DVec2; 3]) -> Self {
+        let turn = (b - a).perp_dot(c - a);
+        let mut edges =
+            Self { left: [[f64::NEG_INFINITY, 0.0]; 3], right: [[f64::INFINITY, 0.0]; 3] };
+        for (side, (from, to)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {
+            let rise = to.y - from.y;
+            // Flat ones bound rows, not columns.
+            if rise == 0.0 {
                 continue;
             }
-            for x in up(from)..=to as i32 as usize {
-                let value = (starts[2] + distance[1] * (f64::from(x as i32) + 0.5)).abs();
-                let texel = &mut self.nearest[row + x - self.columns[0]];
-                if value <= most && (value as f32) < texel.0 {
-                    if own == NOTHING {
-                        own = self.shown.len() as u32;
-                        let [p, q, r] = triangle.texels.map(|at| DVec2::from(at.map(f64::from)));
-                        let u = combine(p.x, [q.x - p.x, r.x - p.x]);
-                        let v = combine(p.y, [q.y - p.y, r.y - p.y]);
-                        let along = [DVec2::new(u[1], v[1]), DVec2::new(u[2], v[2])];
-                        let width = along[0].length().max(along[1].length());
-                        let finer = steps.iter().position(|&step| step <= width * NARROWER);
-                        let level = finer.unwrap_or(steps.len() - 1) as u32;
-                        let at = DVec2::new(u[0], v[0]);
-                        self.shown.push(Shown { triangle: number, level, at, along, weights });
-                    }
-                    *texel = (value as f32, own);
-                }
+            let slope = (to.x - from.x) / rise;
+            // Of columns, whose centres are half a sample farther right.
+            let crossing = from.x - slope * from.y - 0.5;
+            if (rise > 0.0) == (turn > 0.0) {
+                edges.right[side] = [crossing + SLACK, slope];
+            } else {
+                edges.left[side] = [crossing - SLACK, slope];
             }
         }
+        edges
     }
 
-    /// What a texel shows, and its number; `None` beyond these columns and rows too.
+    /// The part of a range of columns whose centres lie in the triangle at `y`.
     #[inline]
-    pub fn at(&self, x: usize, y: usize) -> Option<(u32, &Shown)> {
-        let is_in = |at: usize, [first, end]: [usize; 2]| (first..end).contains(&at);
-        if !is_in(x, self.columns) || !is_in(y, self.rows) {
-            return None;
+    fn span(&self, y: f64, [mut from, mut to]: [f64; 2]) -> [f64; 2] {
+        for side in 0..3 {
+            from = from.max(self.left[side][0] + self.left[side][1] * y);
+            to = to.min(self.right[side][0] + self.right[side][1] * y);
         }
-        let row = (y - self.rows[0]) * (self.columns[1] - self.columns[0]);
-        let number = self.nearest[row + x - self.columns[0]].1;
-        Some((number, self.shown.get(number as usize)?))
+        [from, to]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::Material;
+    use crate::mesh::{Material, Mesh};
     use crate::random::Random;
     use crate::texture::bake::BakeClasses;
 
@@ -326,7 +288,7 @@ mod tests {
             mesh.triangles.push([first, first + 1, first + 2]);
         }
         let classes = BakeClasses::new(&[Material::plain("any")], |_| true);
-        Source::new(&mesh, &classes, |_| Some((0, [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]])))
+        Source::new(&mesh, &classes, |_| Some((0, 0, [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]])))
     }
 
     /// Weights of the corners where the line through a point along a normal meets a triangle's
@@ -340,59 +302,89 @@ mod tests {
         weights.iter().all(|&weight| weight >= 0.0).then_some((weights, away.abs()))
     }
 
+    /// Two triangles that meet at an angle of 40 degrees, seen askew.
+    fn fold() -> (Mesh, ChartPlane) {
+        let corners = [[0.0, 0.0, -0.4], [4.0, 0.5, 0.3], [0.5, 4.0, 0.2], [4.0, 4.0, -1.5]];
+        let mesh = Mesh {
+            positions: corners.to_vec(),
+            triangles: vec![[0, 1, 2], [2, 1, 3]],
+            ..Mesh::default()
+        };
+        let normal = DVec3::new(0.2, 0.3, 1.0).normalize();
+        let right = normal.cross(DVec3::new(-0.3, 1.0, 0.2)).normalize();
+        let up = normal.cross(right);
+        let low = corners.iter().fold(DVec2::INFINITY, |low, corner| {
+            let corner = DVec3::from(corner.map(f64::from));
+            low.min(DVec2::new(corner.dot(right), corner.dot(up)))
+        });
+        (mesh, ChartPlane { right, up, normal, origin: low - 0.5, scale: 8.0 })
+    }
+
     #[test]
-    fn texels_show_what_a_line_along_the_normal_meets_first() {
-        let mut random = Random::new(7, 0);
-        let source = soup(&mut random);
-        // A slope, and texels turned against it.
-        let corners = [[0.0, 0.0, -0.4], [4.0, 0.5, 0.3], [0.5, 4.0, 0.2]];
-        let mesh = Mesh { positions: corners.to_vec(), ..Mesh::default() };
-        let flat = [DVec2::new(31.0, 2.0), DVec2::new(30.0, 33.0), DVec2::new(1.5, 6.0)];
-        let plane = TexelPlane::new(&mesh, [0, 1, 2], flat, 1.5).unwrap();
-        for (corner, flat) in corners.into_iter().zip(flat) {
-            assert!(plane.at(flat).distance(wide(corner)) < 1e-5);
-            assert!(plane.texel(wide(corner)).distance(flat) < 1e-5);
-        }
-        let reach = 0.7;
-        let mut projection = Projection::default();
-        let [columns, rows] = [0..40, 0..40];
-        let texels = [columns.clone(), rows.clone()];
-        projection.gather(&source, &plane, reach);
-        projection.draw(&source, &plane, reach, texels, &[8.0, 4.0, 2.0, 1.0]);
-        let [columns, rows] = [projection.columns, projection.rows].map(|[first, end]| first..end);
-        let (mut shown, mut empty, mut beside) = (0, 0, 0);
-        for (y, x) in rows.flat_map(|y| columns.clone().map(move |x| (y, x))) {
-            let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-            if plane.sides().iter().any(|&[at, x, y]| at + x * centre.x + y * centre.y < 0.0) {
-                assert!(projection.at(x, y).is_none(), "{x} {y} is beside the triangle");
-                beside += 1;
-                continue;
-            }
-            let point = plane.at(centre);
-            let lies_over = (0..TRIANGLES).filter_map(|number| {
-                let (weights, away) = met(point, plane.normal, source.corners(number))?;
-                let cosine = source.triangle(number).normal.dot(plane.normal);
-                Some((away * Source::weight(cosine), away, weights, number))
-            });
-            let nearest =
-                lies_over.filter(|&(_, away, ..)| away <= reach).min_by(|a, b| a.0.total_cmp(&b.0));
-            let Some((_, _, weights, number)) = nearest else {
-                assert!(projection.at(x, y).is_none(), "{x} {y}");
-                empty += 1;
-                continue;
+    fn samples_show_what_a_line_along_the_normal_meets_first() {
+        const SIDE: usize = 60;
+        const REACH: f64 = 0.7;
+        let source = soup(&mut Random::new(7, 0));
+        let (mesh, plane) = fold();
+        let facets: Vec<Option<Facet>> = mesh
+            .triangles
+            .iter()
+            .map(|&triangle| Facet::new(&plane, &mesh, triangle, REACH, 1.5))
+            .collect();
+        let centre = |x: usize, y: usize| DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+        let owner = |x: usize, y: usize| {
+            let is_in = |&triangle: &u32| {
+                let flat = mesh.corners(mesh.triangles[triangle as usize]);
+                let [a, b, c] = flat.map(|corner| plane.project(corner).truncate() - centre(x, y));
+                a.perp_dot(b) > 0.0 && b.perp_dot(c) > 0.0 && c.perp_dot(a) > 0.0
             };
-            shown += 1;
-            let (_, found) = projection.at(x, y).unwrap();
-            assert_eq!(found.triangle, number, "{x} {y}");
-            for (found, expected) in found.weights(centre).into_iter().zip(weights) {
-                assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+            [0, 1].into_iter().find(is_in).unwrap_or(NOTHING)
+        };
+        let owners: Vec<Vec<u32>> =
+            (0..SIDE).map(|y| (0..SIDE).map(|x| owner(x, y)).collect()).collect();
+        let (mut projection, mut tile) = (Projection::default(), Tile::default());
+        let (mut shown, mut empty, mut free) = ([0; 2], 0, 0);
+        // All at once, and in parts.
+        for side in [SIDE, 25] {
+            let parts = || (0..SIDE).step_by(side).map(|from| from..(from + side).min(SIDE));
+            for [columns, rows] in parts().flat_map(|y| parts().map(move |x| [x, y.clone()])) {
+                tile.fill([columns.clone(), rows.clone()], 1, |y| &owners[y], &facets);
+                projection.draw(&source, &plane, &tile, &facets);
+                for (y, x) in rows.flat_map(|y| columns.clone().map(move |x| (y, x))) {
+                    let number = projection.numbers[tile.index(x, y)] as usize;
+                    let Some(Some(facet)) = facets.get(owners[y][x] as usize) else {
+                        assert_eq!(number, NOTHING as usize, "{x} {y} is nobody's");
+                        free += 1;
+                        continue;
+                    };
+                    let point = plane.at(centre(x, y), facet.height(centre(x, y)));
+                    let nearest = (0..TRIANGLES)
+                        .filter_map(|number| {
+                            let (weights, away) = met(point, facet.normal, source.corners(number))?;
+                            let cosine = source.triangle(number).normal.dot(facet.normal);
+                            Some((away * Source::weight(cosine), away, weights, number))
+                        })
+                        .filter(|&(_, away, ..)| away <= REACH)
+                        .min_by(|a, b| a.0.total_cmp(&b.0));
+                    let Some((_, _, weights, expected)) = nearest else {
+                        assert_eq!(number, NOTHING as usize, "{x} {y}");
+                        empty += 1;
+                        continue;
+                    };
+                    shown[owners[y][x] as usize] += 1;
+                    let found = &projection.shown[number];
+                    assert_eq!(found.triangle, expected, "{x} {y}");
+                    for (found, expected) in found.weights(centre(x, y)).into_iter().zip(weights) {
+                        assert!((found - expected).abs() < 1e-5, "{found} {expected}");
+                    }
+                    let texel = DVec2::new(weights[1], weights[2]) * 100.0;
+                    let [origin, right, down] = found.texels(1.0);
+                    let at = origin + right * centre(x, y).x + down * centre(x, y).y;
+                    assert!(at.distance(texel) < 1e-3);
+                }
             }
-            let texel = DVec2::new(weights[1], weights[2]) * 100.0;
-            let [origin, right, down] = found.texels(1.0);
-            let shown = origin + right * centre.x + down * centre.y;
-            assert!(shown.distance(texel) < 1e-3);
         }
-        assert!(shown > 300 && empty > 50, "{shown} shown, {empty} empty");
-        assert!(beside > 200, "{beside} beside");
+        assert!(shown.iter().all(|&count| count > 300), "{shown:?}");
+        assert!(empty > 50 && free > 200, "{empty} empty, {free} free");
     }
 }

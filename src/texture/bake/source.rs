@@ -1,6 +1,6 @@
 //! The block's original surface, as texels of coarse nodes look for it.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::classes::BakeClasses;
 use crate::mesh::{Mesh, Surface, wide};
@@ -30,12 +30,22 @@ pub(crate) struct SourceTriangle {
     pub normal: DVec3,
     /// Texture of the model.
     pub texture: u32,
+    /// Triangles of one chart lie beside each other in the image as they do in space.
+    pub chart: u32,
     /// Positions of the corners in the part of the image that the block uses, source texels.
     pub texels: [[f32; 2]; 3],
     /// Vertex colours of the corners.
     pub colors: Option<[[u16; 4]; 3]>,
     /// Source texels in a square metre.
     pub density: f64,
+}
+
+impl SourceTriangle {
+    /// Source texels.
+    pub fn texel_area(&self) -> f64 {
+        let [p, q, r] = self.texels.map(|texel| DVec2::from(texel.map(f64::from)));
+        (q - p).perp_dot(r - p).abs() * 0.5
+    }
 }
 
 /// A point of the original.
@@ -49,11 +59,11 @@ pub(crate) struct SurfacePoint {
 
 impl Source {
     /// The triangles of `mesh` whose material is of some class. `texels` gives the texture of a
-    /// triangle and where its corners lie in it.
+    /// triangle, its chart, and where its corners lie in the image.
     pub fn new(
         mesh: &Mesh,
         classes: &BakeClasses,
-        texels: impl Fn([u32; 3]) -> Option<(u32, [[f64; 2]; 3])>,
+        texels: impl Fn([u32; 3]) -> Option<(u32, u32, [[f64; 2]; 3])>,
     ) -> Self {
         let mut triangles = Vec::new();
         let mut sources = Vec::new();
@@ -61,7 +71,7 @@ impl Source {
             if classes.of(mesh.triangle_material(triangle)).is_none() {
                 continue;
             }
-            let Some((texture, texels)) = texels(triangle) else { continue };
+            let Some((texture, chart, texels)) = texels(triangle) else { continue };
             let [a, b, c] = mesh.corners(triangle);
             let cross = (b - a).cross(c - a);
             let [p, q, r] = texels.map(glam::DVec2::from);
@@ -70,6 +80,7 @@ impl Source {
             sources.push(SourceTriangle {
                 normal: cross.normalize_or_zero(),
                 texture,
+                chart,
                 texels: texels.map(|corner| corner.map(|value| value as f32)),
                 colors: colored.then(|| triangle.map(|vertex| mesh.colors[vertex as usize])),
                 density: texel_area / cross.length().max(f64::MIN_POSITIVE),
