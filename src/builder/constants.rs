@@ -288,7 +288,7 @@ pub struct OutlineConstants {
     pub exponent: f64,
     /// But no more than this share of those of its children, 0–1.
     pub most_triangles: f64,
-    /// Along each side of a node's ground, and columns of each skyline, 1 or more.
+    /// Along the longer side of a node's ground, and columns of each skyline, 1 or more.
     pub cells: usize,
 }
 

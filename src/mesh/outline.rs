@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::UpAxis;
 
 /// Skylines, evenly over half a turn: from the other side each is the same.
-const SIDES: usize = 8;
+const SIDES: usize = 4;
 
 /// The ground and the heights that outlines are compared on: that of a source.
 pub struct OutlineFrame {
@@ -23,8 +23,10 @@ pub struct OutlineFrame {
     low: DVec3,
     /// Cells a metre.
     per_metre: DVec2,
-    /// Along each side of the ground, and columns of each skyline.
-    cells: usize,
+    /// Along each side of the ground.
+    cells: [usize; 2],
+    /// Of each skyline.
+    columns: usize,
     /// By skyline: how many columns it runs to with each metre along either axis of the ground, and
     /// where it begins, in columns.
     sides: [[f64; SIDES]; 3],
@@ -46,7 +48,7 @@ pub struct Outline {
 }
 
 /// What is kept of the ground that a source covers, seen from above, and of its skylines, seen from
-/// sixteen sides: shares of the source, 0–1. `None` where the source covers nothing.
+/// eight sides: shares of the source, 0–1. `None` where the source covers nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Kept {
     /// Of the covered ground, what is covered still.
@@ -63,17 +65,19 @@ pub struct Kept {
 
 const EMPTY: u64 = 0;
 
+/// Along the shorter side of the ground at least: square cells may be wider than a long strip.
+const LEAST_CELLS: usize = 16;
+
 /// Numbers that this is added to are rounded to whole ones.
 const WHOLE: f64 = 1.5 * (1u64 << 52) as f64;
 
 impl OutlineFrame {
-    /// Around these positions, with so many cells along each side of the ground (square ones would be
-    /// wider than a long strip), and as many columns in each skyline; `None` where they are all in
-    /// one place seen from above.
+    /// Around these positions, with so many cells along the longer side of the ground, about square,
+    /// and as many columns in each skyline; `None` where they are all in one place seen from above.
     pub fn around(
         up: UpAxis,
         positions: impl IntoIterator<Item = DVec3>,
-        cells: usize,
+        columns: usize,
     ) -> Option<Self> {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for position in positions {
@@ -85,9 +89,13 @@ impl OutlineFrame {
             return None;
         }
         // A side without length has no cells' centres on it.
-        let per_metre = size.map(|side| if side > 0.0 { cells as f64 / side } else { 0.0 });
-        let mut sides = [[0.0; SIDES]; 3];
-        for side in 0..SIDES {
+        let square = size.max_element() / columns as f64;
+        let least = LEAST_CELLS.min(columns);
+        let cells = size.to_array().map(|side| ((side / square) as usize).clamp(least, columns));
+        let per =
+            |axis: usize| if size[axis] > 0.0 { cells[axis] as f64 / size[axis] } else { 0.0 };
+        let per_metre = DVec2::new(per(0), per(1));
+        let each: [[f64; 3]; SIDES] = std::array::from_fn(|side| {
             // libm's, which is alike on all machines.
             let (sin, cos) = libm::sincos(PI * side as f64 / SIDES as f64);
             let axis = DVec2::new(cos, sin);
@@ -95,21 +103,22 @@ impl OutlineFrame {
                 [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(|at| (at * size).dot(axis));
             let first = corners.into_iter().fold(f64::INFINITY, f64::min);
             let last = corners.into_iter().fold(f64::NEG_INFINITY, f64::max);
-            let per_metre = cells as f64 / (last - first).max(f64::MIN_POSITIVE);
+            let per_metre = columns as f64 / (last - first).max(f64::MIN_POSITIVE);
             let [x, y] = (axis * per_metre).to_array();
-            (sides[0][side], sides[1][side], sides[2][side]) = (x, y, first * per_metre);
-        }
-        Some(Self { up, low, per_metre, cells, sides })
+            [x, y, first * per_metre]
+        });
+        let sides = std::array::from_fn(|part| each.map(|side| side[part]));
+        Some(Self { up, low, per_metre, cells, columns, sides })
     }
 
     /// An outline of nothing.
     pub fn empty(&self) -> Outline {
         let none = |count: usize| (0..count).map(|_| AtomicU64::new(EMPTY)).collect();
         Outline {
-            covered: none((self.cells * self.cells).div_ceil(64)),
-            top: none(SIDES * self.cells),
-            bottom: none(SIDES * self.cells),
-            columns: self.cells,
+            covered: none((self.cells[0] * self.cells[1]).div_ceil(64)),
+            top: none(SIDES * self.columns),
+            bottom: none(SIDES * self.columns),
+            columns: self.columns,
             widths: std::array::from_fn(|side| {
                 1.0 / DVec2::new(self.sides[0][side], self.sides[1][side]).length()
             }),
@@ -125,7 +134,7 @@ impl OutlineFrame {
         let lowest = bottom_bits(heights.into_iter().fold(f64::INFINITY, f64::min));
         let [along, columns] = self.on_skylines(corners);
         for side in 0..SIDES {
-            let of = side * self.cells..(side + 1) * self.cells;
+            let of = side * self.columns..(side + 1) * self.columns;
             let (top, bottom) = (&outline.top[of.clone()], &outline.bottom[of]);
             let columns = columns.map(|columns| columns[side]);
             if columns[0] == columns[1] && columns[1] == columns[2] {
@@ -151,7 +160,7 @@ impl OutlineFrame {
     /// farther: all skylines at once, without branches.
     fn on_skylines(&self, corners: [DVec3; 3]) -> [[[f64; SIDES]; 3]; 2] {
         let [along_x, along_y, first] = &self.sides;
-        let last = self.cells as f64;
+        let last = self.columns as f64;
         let (mut along, mut columns) = ([[0.0; SIDES]; 3], [[0.0; SIDES]; 3]);
         for corner in 0..3 {
             let [x, y] = corners[corner].truncate().to_array();
@@ -172,10 +181,21 @@ impl OutlineFrame {
             let [x, y] = (corner.truncate() * self.per_metre).to_array();
             DVec2::new(y, x)
         });
-        for row in centres(corners.map(|corner| corner.x), self.cells) {
-            let Some([from, to]) = across(corners, row as f64 + 0.5) else { continue };
-            for column in centres([from, to], self.cells) {
-                let bit = row * self.cells + column;
+        let rows = centres(corners.map(|corner| corner.x), self.cells[1]);
+        let columns = centres(corners.map(|corner| corner.y), self.cells[0]);
+        if rows.is_empty() || columns.is_empty() {
+            return;
+        }
+        let [a, b, c] = corners;
+        let edges = [[a, b], [b, c], [c, a]].map(|[from, to]| Edge {
+            from,
+            end: to.x,
+            slope: (to.y - from.y) / (to.x - from.x),
+        });
+        for row in rows {
+            let Some([from, to]) = across(&edges, row as f64 + 0.5) else { continue };
+            for column in centres([from, to], self.cells[0]) {
+                let bit = row * self.cells[0] + column;
                 let word = &covered[bit / 64];
                 let mask = 1 << (bit % 64);
                 // Most are there already, and reading is cheaper.
@@ -240,15 +260,22 @@ fn centres(coordinates: impl IntoIterator<Item = f64>, count: usize) -> Range<us
         .fold(count..0, |range, at| range.start.min(at)..range.end.max(at))
 }
 
+/// An edge of a triangle.
+struct Edge {
+    from: DVec2,
+    /// The first coordinate at its end.
+    end: f64,
+    /// By how much the second coordinate grows with the first; not a number where that stays.
+    slope: f64,
+}
+
 /// Where a line of equal first coordinate crosses a triangle: the least and largest second one.
-fn across(corners: [DVec2; 3], at: f64) -> Option<[f64; 2]> {
-    let [a, b, c] = corners;
-    let crossing = |[from, to]: [DVec2; 2]| {
-        let is_across = (from.x < at) != (to.x < at);
-        is_across.then(|| from.y + (to.y - from.y) * ((at - from.x) / (to.x - from.x)))
+fn across(edges: &[Edge; 3], at: f64) -> Option<[f64; 2]> {
+    let crossing = |edge: &Edge| {
+        let is_across = (edge.from.x < at) != (edge.end < at);
+        is_across.then_some(edge.from.y + (at - edge.from.x) * edge.slope)
     };
-    let crossings = [[a, b], [b, c], [c, a]].into_iter().filter_map(crossing);
-    crossings.fold(None, |range, y| match range {
+    edges.iter().filter_map(crossing).fold(None, |range, y| match range {
         None => Some([y, y]),
         Some([low, high]) => Some([low.min(y), high.max(y)]),
     })
@@ -387,8 +414,8 @@ mod tests {
             assert!(found.area_added.unwrap() < 1e-3);
 
             let (mut height, mut both, mut more) = (0.0, 0.0, 0.0);
-            for side in 0..8 {
-                let angle = PI / 8.0 * f64::from(side);
+            for side in 0..SIDES {
+                let angle = PI * side as f64 / SIDES as f64;
                 let top = |boxes: &[[DVec3; 2]], at: f64| {
                     let over = boxes.iter().filter(|[low, size]| {
                         let middle = *low + *size * 0.5;

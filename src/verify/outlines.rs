@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::geometry::NodeGeometry;
 use crate::mesh::{Kept, Outline, OutlineFrame, UpAxis};
 
-/// Along each side of the scene.
+/// Along the longer side of the scene.
 const CELLS: usize = 4096;
 
 /// The outline of all leaves, to compare fronts with.
