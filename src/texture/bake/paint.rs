@@ -122,7 +122,8 @@ impl BlockTextures<'_> {
             // What is around the triangles grows with their sides, not with their areas.
             let around = (taken / factor - inside * factor).max(0.0);
             let root = (around * around + 4.0 * inside * share).sqrt();
-            factor = (2.0 * share / (around + root)).clamp(factor * 0.5, factor);
+            // Whatever is no number here leaves it between these two.
+            factor = (2.0 * share / (around + root)).max(factor * 0.5).min(factor);
             if factor < LEAST_SCALE {
                 factor = LEAST_SCALE;
                 break;
