@@ -48,7 +48,7 @@ def main():
     print(full)
     if arguments.write:
         write_between_markers(DOCS / "benchmarks.md", "figures", full)
-        short = paragraphs([summary_table(cities), machine()])
+        short = paragraphs([summary_table(cities), about[0]])
         write_between_markers(ROOT / "README.md", "summary", short)
 
 
