@@ -8,11 +8,13 @@
 use std::time::Instant;
 
 use glam::DVec3;
+use hlod::bench::ClockConstants;
 use hlod::camera::{Pose, View, from_angles};
 use hlod::engine::policies::lakhia::{Lakhia, LakhiaOptions};
-use hlod::engine::{FrameInput, Policy, Residents, Selection};
+use hlod::engine::{CostModel, FrameInput, Policy, Residents, Selection};
 use hlod::mesh::UpAxis;
 use hlod::runtime::SceneTree;
+use hlod::runtime::residency::MemoryUse;
 
 #[path = "../tests/bench/tall_street.rs"]
 mod tall_street;
@@ -51,11 +53,21 @@ impl Case {
 
     fn measure(&mut self) {
         let Self { tree, residents, best_ms, selection } = self;
+        let costs = CostModel::new(&ClockConstants::default().prices);
         let mut policy = Lakhia::new(LakhiaOptions::default());
         let mut select = |frame| {
             // Time for all of them.
-            let (view, target_ms, dt_s) = (&view(frame), 1e9, 0.02);
-            policy.select(&FrameInput { tree, view, residents, target_ms, dt_s }, selection);
+            let frame = FrameInput {
+                tree,
+                view: &view(frame),
+                predicted: &[],
+                residents,
+                memory: MemoryUse::default(),
+                costs: &costs,
+                target_ms: 1e9,
+                dt_s: 0.02,
+            };
+            policy.select(&frame, selection);
         };
         select(0);
         let begin = Instant::now();

@@ -69,8 +69,8 @@ impl Accuracy {
 
 /// Looks at frames beside a run, which it does not change.
 pub trait FrameInspector {
-    /// Whether it looks at this frame of the path.
-    fn wants(&self, index: usize) -> bool;
+    /// Whether it inspects this frame of the path, in which levels toggled or not.
+    fn wants(&self, index: usize, toggled: bool) -> bool;
 
     /// Looks at a frame that is over.
     fn inspect(&mut self, frame: FrameSample<'_>) -> Result<Accuracy>;

@@ -5,6 +5,7 @@ mod clock;
 mod compare;
 mod model_backend;
 mod options;
+pub mod policies;
 mod record;
 #[cfg(feature = "render")]
 mod reference;
@@ -24,7 +25,7 @@ pub use accuracy::{Accuracy, FrameInspector, FrameSample, ReferenceContext, Wors
 pub use clock::{CLOCK_FILE_VERSION, ClockConstants};
 pub use compare::{Comparison, Limit, Limits, Row, SummaryFile, Unit, compare};
 pub use model_backend::ModelBackend;
-pub use options::{BenchOptions, Pace, Size};
+pub use options::{BenchOptions, Pace, PolicyChoice, Size};
 pub use record::FrameRecord;
 #[cfg(feature = "render")]
 pub use reference::{Reference, ReferenceRenderer, SilhouetteTolerance};

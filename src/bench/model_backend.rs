@@ -1,29 +1,100 @@
-//! A backend in which time follows from the cost model and loading from a number of bytes a
-//! millisecond, so that runs are the same on every machine.
+//! A backend in which nothing is read or drawn, so that runs are the same on every machine.
+//!
+//! How long a frame takes is not what the engine's cost model says, nor any policy: there would
+//! be nothing to learn. Nodes hide what is behind them by degrees, geometry and fragments pass
+//! side by side as far as the machine has units for both, what is new is slower in its first
+//! frame, times scatter, and now and then the whole machine stalls.
 
 use std::sync::Mutex;
 
 use super::ClockConstants;
 use crate::camera::View;
 use crate::engine::lock;
-use crate::engine::{Backend, Drawn};
+use crate::engine::{Backend, Drawn, geometry_load};
+use crate::random::Random;
+use crate::runtime::SceneTree;
 use crate::runtime::residency::{Changes, Residency};
-use crate::runtime::{SceneTree, covered};
 use crate::{Error, Result};
 
-/// A backend in which time follows from the cost model. Nothing is read or drawn.
+/// A backend in which time follows from constants and a seed.
 #[derive(Clone, Debug)]
 pub struct ModelBackend<'a> {
     tree: &'a SceneTree,
     constants: ClockConstants,
+    seed: u64,
+    frames: u64,
+    /// Bytes of nodes that were uploaded and not yet drawn.
+    cold_bytes: u64,
+    /// Seconds of the frame before.
+    dt_s: f64,
     /// Bytes that loading had time for and did not read, or the other way round below 0.
     credit: f64,
+    /// Nodes drawn, near ones first, with the part of the image under each.
+    by_distance: Vec<(f64, f64, u32)>,
 }
 
 impl<'a> ModelBackend<'a> {
-    /// A backend over a hierarchy.
-    pub fn new(tree: &'a SceneTree, constants: ClockConstants) -> Self {
-        Self { tree, constants, credit: 0.0 }
+    /// A backend over a hierarchy; `seed` is that of noise and stalls.
+    pub fn new(tree: &'a SceneTree, constants: ClockConstants, seed: u64) -> Self {
+        Self {
+            tree,
+            constants,
+            seed,
+            frames: 0,
+            cold_bytes: 0,
+            dt_s: 0.0,
+            credit: 0.0,
+            by_distance: Vec::new(),
+        }
+    }
+
+    /// Milliseconds of vertices, triangles and draw calls.
+    fn geometry_ms(&self, front: &[u32]) -> f64 {
+        let prices = &self.constants.prices;
+        let ms = |&node: &u32| {
+            let load = geometry_load(self.tree.node(node));
+            load.draws * prices.draw
+                + load.vertices * prices.vertex
+                + load.triangles * prices.triangle
+        };
+        front.iter().map(ms).sum()
+    }
+
+    /// Milliseconds of fragments: the more of the image is covered by nearer nodes, the less of a
+    /// node's are shaded.
+    fn fragment_ms(&mut self, front: &[u32], view: &View) -> f64 {
+        let eye = view.pose.position;
+        self.by_distance.clear();
+        self.by_distance.extend(front.iter().map(|&node| {
+            let bbox = self.tree.node(node).bbox;
+            (eye.distance(eye.clamp(bbox[0], bbox[1])), view.frustum.covered(bbox), node)
+        }));
+        self.by_distance.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+        let ClockConstants { prices, overdraw, .. } = self.constants;
+        let [width, height] = view.size.map(f64::from);
+        let (mut hidden, mut ms) = (0.0, 0.0);
+        for &(_, covered, node) in &self.by_distance {
+            let shaded = covered * (1.0 - hidden);
+            hidden += shaded;
+            let node = self.tree.node(node);
+            let textured = f64::from(node.textured_triangles) / f64::from(node.triangles.max(1));
+            let price =
+                prices.textured_fragment * textured + prices.plain_fragment * (1.0 - textured);
+            ms += (shaded + overdraw * (covered - shaded)) * width * height * price;
+        }
+        ms
+    }
+
+    /// What a frame takes by chance: a factor, and milliseconds.
+    fn chance(&self) -> (f64, f64) {
+        let ClockConstants { noise, stalls_per_s, stall_ms, .. } = self.constants;
+        let mut random = Random::new(self.seed, self.frames);
+        // Two numbers give one of a normal distribution (Box and Muller 1958).
+        let [u, v] = [1.0 - random.unit(), random.unit()];
+        let normal = (-2.0 * libm::log(u)).sqrt() * libm::cos(std::f64::consts::TAU * v);
+        let stalls = random.unit() < 1.0 - libm::exp(-stalls_per_s * self.dt_s);
+        let stall_ms = if stalls { -stall_ms * libm::log(1.0 - random.unit()) } else { 0.0 };
+        (libm::exp(noise * normal), stall_ms)
     }
 }
 
@@ -40,8 +111,9 @@ impl Backend for ModelBackend<'_> {
         Ok(())
     }
 
-    fn apply(&mut self, _: &Changes) -> Result<f64> {
-        Ok(0.0)
+    fn apply(&mut self, changes: &Changes) -> Result<f64> {
+        self.cold_bytes = changes.arrived_bytes;
+        Ok(self.constants.prices.uploaded_byte * changes.arrived_bytes as f64)
     }
 
     fn now_ms(&mut self) -> f64 {
@@ -49,10 +121,13 @@ impl Backend for ModelBackend<'_> {
     }
 
     fn draw(&mut self, front: &[u32], view: &View) -> Result<Drawn> {
-        let cost: f64 = front.iter().map(|&node| self.tree.node(node).cost).sum();
-        let ClockConstants { fixed_ms, ms_per_cost, fill_cost, ms_per_node, .. } = self.constants;
-        let load = cost + fill_cost * covered(self.tree, front, view);
-        Ok(Drawn { draw_ms: fixed_ms + ms_per_cost * load + ms_per_node * front.len() as f64 })
+        let (geometry, fragments) = (self.geometry_ms(front), self.fragment_ms(front, view));
+        let ClockConstants { prices, overlap, cold_byte, .. } = self.constants;
+        let both = geometry + fragments - overlap * geometry.min(fragments);
+        let cold = cold_byte * self.cold_bytes as f64;
+        let (factor, stall_ms) = self.chance();
+        self.frames += 1;
+        Ok(Drawn { draw_ms: factor * (prices.frame + both + cold) + stall_ms })
     }
 
     fn end_frame(
@@ -62,7 +137,9 @@ impl Backend for ModelBackend<'_> {
         interval_ms: f64,
     ) -> Result<()> {
         let mut residency = lock(residency)?;
-        self.credit += frame_ms.max(interval_ms) * self.constants.load_bytes_per_ms;
+        let ms = frame_ms.max(interval_ms);
+        self.dt_s = ms / 1e3;
+        self.credit += ms * self.constants.load_bytes_per_ms;
         while self.credit > 0.0 {
             let Some(step) = residency.next_step() else {
                 self.credit = 0.0; // time in which there was nothing to do is gone
@@ -78,5 +155,55 @@ impl Backend for ModelBackend<'_> {
 
     fn process_bytes(&mut self) -> u64 {
         0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::test_frame::triangles_alone;
+    use crate::runtime::test_tree::{Sketch, sketch, tree, view};
+
+    fn draw_ms(constants: ClockConstants, seed: u64, frames: usize) -> Vec<f64> {
+        let wall = |x: f64| Sketch { size: 100.0, ..sketch([x, 0.0, 0.0], 1.0, vec![]) };
+        let tree = tree(vec![wall(60.0), wall(160.0)]);
+        let mut backend = ModelBackend::new(&tree, constants, seed);
+        (0..frames).map(|_| backend.draw(&[0, 1], &view()).unwrap().draw_ms).collect()
+    }
+
+    /// 20 triangles at 1 ms, and an image of 10,000 fragments.
+    fn constants() -> ClockConstants {
+        let prices = Prices { plain_fragment: 1e-3, ..triangles_alone(1.0) };
+        ClockConstants { prices, ..ClockConstants::default() }
+    }
+
+    use crate::engine::Prices;
+
+    #[test]
+    fn what_is_hidden_takes_its_part_and_units_work_side_by_side() {
+        // The near wall fills the image; a fifth or so of it is under the far one.
+        let far = view().frustum.covered(
+            tree(vec![Sketch { size: 100.0, ..sketch([160.0, 0.0, 0.0], 1.0, vec![]) }])
+                .node(0)
+                .bbox,
+        );
+        let hidden = |overdraw, overlap| {
+            draw_ms(ClockConstants { overdraw, overlap, ..constants() }, 0, 1)[0]
+        };
+        assert!((hidden(0.0, 0.0) - 30.0).abs() < 1e-9);
+        assert!((hidden(0.5, 0.0) - (30.0 + 5.0 * far)).abs() < 1e-9);
+        assert!((hidden(0.0, 1.0) - 20.0).abs() < 1e-9, "the longer of both");
+    }
+
+    #[test]
+    fn noise_and_stalls_are_those_of_the_seed() {
+        let noisy = ClockConstants { noise: 0.1, stalls_per_s: 1.0, stall_ms: 50.0, ..constants() };
+        let (one, again, other) =
+            (draw_ms(noisy, 1, 100), draw_ms(noisy, 1, 100), draw_ms(noisy, 2, 100));
+        assert!(one == again && one != other);
+        let mean = draw_ms(ClockConstants { noise: 0.1, ..constants() }, 3, 4000);
+        let logarithms: Vec<f64> = mean.iter().map(|ms| libm::log(*ms)).collect();
+        let deviation = crate::bench::statistics::deviation(&logarithms);
+        assert!((deviation - 0.1).abs() < 0.005, "{deviation}");
     }
 }

@@ -2,17 +2,18 @@
 
 use serde::Serialize;
 
-use crate::engine::policies::lakhia::LakhiaOptions;
+use crate::engine::Policy;
+use crate::engine::policies::{POLICIES, PolicyKind, Settings};
 use crate::runtime::residency::ResidencyOptions;
 use crate::{Error, Result};
 
 /// All that determines a run, beside scene and path.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BenchOptions {
     /// Milliseconds that a frame may take (`c_targetTime`), above 0.
     pub target_ms: f64,
     /// How levels are chosen.
-    pub selection: LakhiaOptions,
+    pub policy: PolicyChoice,
     /// Memory and loading.
     pub residency: ResidencyOptions,
     /// How fast frames follow each other.
@@ -21,17 +22,20 @@ pub struct BenchOptions {
     pub size: Size,
     /// Frames for which the camera stands at the first pose before the log begins.
     pub warm_up_frames: u64,
+    /// Seed of the model clock's noise and stalls.
+    pub seed: u64,
 }
 
 impl Default for BenchOptions {
     fn default() -> Self {
         Self {
             target_ms: Self::TARGET_MS,
-            selection: LakhiaOptions::DEFAULT,
+            policy: PolicyChoice::default(),
             residency: ResidencyOptions::DEFAULT,
             pace: Pace::default(),
             size: Size::default(),
             warm_up_frames: 0,
+            seed: 0,
         }
     }
 }
@@ -42,39 +46,8 @@ impl BenchOptions {
 
     /// Refuses what is out of range, by the name of the option.
     pub fn check(&self) -> Result<()> {
-        let selection = &self.selection;
         let ranges = [
             ("--target-ms", self.target_ms, self.target_ms > 0.0, "above 0"),
-            ("--vis", selection.vis, selection.vis >= 0.0, "at least 0"),
-            ("--fore", selection.fore, (0.0..=1.0).contains(&selection.fore), "0 to 1"),
-            ("--hyst-switch", selection.hyst_switch, selection.hyst_switch > 0.0, "above 0"),
-            (
-                "--hyst-limit",
-                selection.hyst_limit,
-                selection.hyst_limit >= selection.hyst_switch,
-                "at least --hyst-switch",
-            ),
-            ("--lookahead", selection.lookahead_s, selection.lookahead_s >= 0.0, "at least 0"),
-            (
-                "--least-distance",
-                selection.least_distance,
-                selection.least_distance > 0.0,
-                "above 0",
-            ),
-            (
-                "--v-time-gain",
-                selection.v_time_gain,
-                (0.0..=1.0).contains(&selection.v_time_gain),
-                "0 to 1",
-            ),
-            (
-                "--share-gain",
-                selection.share_gain,
-                (0.0..1.0).contains(&selection.share_gain),
-                "0 to 1, 1 excluded",
-            ),
-            ("--share-limit", selection.share_limit, selection.share_limit >= 1.0, "at least 1"),
-            ("--share-slack", selection.share_slack, selection.share_slack >= 0.0, "at least 0"),
             (
                 "--evict-margin",
                 self.residency.evict_margin,
@@ -91,6 +64,40 @@ impl BenchOptions {
             return Err(Error::Usage("--chunk: expected at least 1 byte, found 0".into()));
         }
         Ok(())
+    }
+}
+
+/// A policy, by its name, with all of its constants.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PolicyChoice {
+    name: &'static str,
+    constants: Settings,
+}
+
+impl PolicyChoice {
+    /// A policy with some constants set; refuses names and values that there are not.
+    pub fn new(name: &str, settings: &Settings) -> Result<Self> {
+        let kind = PolicyKind::find(name)?;
+        kind.make(settings)?;
+        Ok(Self { name: kind.name, constants: kind.values(settings) })
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// The policy, before its first frame.
+    pub fn make(&self) -> Result<Box<dyn Policy>> {
+        PolicyKind::find(self.name)?.make(&self.constants)
+    }
+}
+
+impl Default for PolicyChoice {
+    /// The first of the table.
+    fn default() -> Self {
+        let kind = POLICIES[0];
+        Self { name: kind.name, constants: kind.values(&Settings::new()) }
     }
 }
 

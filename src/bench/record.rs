@@ -19,8 +19,9 @@ pub struct FrameRecord {
 }
 
 impl FrameRecord {
-    /// The header of `frames.csv` for a scene with this many levels.
-    pub fn header(levels: usize) -> Vec<String> {
+    /// The header of `frames.csv` for a scene with this many levels, and a policy with these
+    /// [diagnostics](crate::engine::Policy::diagnostics).
+    pub fn header(levels: usize, diagnostics: &[&str]) -> Vec<String> {
         let fixed = [
             "frame",
             "time_s",
@@ -31,11 +32,15 @@ impl FrameRecord {
             "select_ms",
             "upload_ms",
             "draw_ms",
-            "v_time",
-            "share_ms",
-            "covered",
+            "modelled_ms",
+            "modelled_deviation_ms",
             "toggles_up",
             "toggles_down",
+            "toggles_chosen",
+            "toggles_arrived",
+            "toggles_evicted",
+            "toggles_came_into_view",
+            "finer_resident",
             "nodes",
             "triangles",
             "visited",
@@ -43,6 +48,8 @@ impl FrameRecord {
             "memory_bytes",
             "resident",
             "read_bytes",
+            "reread_bytes",
+            "uploaded_bytes",
             "arrived",
             "waiting",
             "evictions",
@@ -51,7 +58,8 @@ impl FrameRecord {
         let by_level = |what: &str| (0..levels).map(|l| format!("{what}_level_{l}")).collect();
         let by_level: [Vec<String>; 2] = [by_level("nodes"), by_level("triangles")];
         let fixed = fixed.into_iter().chain(Accuracy::COLUMNS).map(String::from);
-        fixed.chain(by_level.concat()).collect()
+        let diagnostics = diagnostics.iter().map(|&name| name.to_owned());
+        fixed.chain(by_level.concat()).chain(diagnostics).collect()
     }
 
     /// The fields in the order of the header.
@@ -67,11 +75,15 @@ impl FrameRecord {
             report.select_ms.to_string(),
             report.upload_ms.to_string(),
             report.draw_ms.to_string(),
-            report.v_time.to_string(),
-            report.share_ms.to_string(),
-            report.covered.to_string(),
+            report.modelled_ms.to_string(),
+            report.modelled_deviation_ms.to_string(),
             report.toggles_up.to_string(),
             report.toggles_down.to_string(),
+            report.toggle_causes.chosen.to_string(),
+            report.toggle_causes.arrived.to_string(),
+            report.toggle_causes.evicted.to_string(),
+            report.toggle_causes.came_into_view.to_string(),
+            u8::from(report.finer_resident).to_string(),
             report.nodes.to_string(),
             report.triangles.to_string(),
             report.visited.to_string(),
@@ -79,6 +91,8 @@ impl FrameRecord {
             report.memory_bytes.to_string(),
             report.resident.to_string(),
             report.read_bytes.to_string(),
+            report.reread_bytes.to_string(),
+            report.uploaded_bytes.to_string(),
             report.arrived.to_string(),
             report.waiting.to_string(),
             report.evictions.to_string(),
@@ -90,6 +104,7 @@ impl FrameRecord {
         }
         fields.extend(report.nodes_by_level.iter().map(u32::to_string));
         fields.extend(report.triangles_by_level.iter().map(u64::to_string));
+        fields.extend(report.diagnostics.iter().map(f64::to_string));
         fields
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use super::{BenchOptions, FrameInspector, FrameRecord, FrameSample, Pace};
 use crate::Result;
 use crate::camera::{CameraPath, View};
-use crate::engine::{Backend, Engine, Policy};
+use crate::engine::{Backend, CostModel, Engine, Policy};
 use crate::runtime::SceneTree;
 use crate::runtime::residency::Residency;
 
@@ -21,6 +21,8 @@ pub struct Replay<'a> {
     pub residency: Arc<Mutex<Residency>>,
     /// Where it takes place.
     pub backend: &'a mut dyn Backend,
+    /// What frames are expected to take at first.
+    pub costs: CostModel,
     /// Who inspects its frames, or nobody.
     pub inspector: Option<&'a mut dyn FrameInspector>,
     /// What else determines it.
@@ -41,8 +43,8 @@ pub struct Run {
 /// Replays a path; `progress` is told of each frame that is done and ends the run where it says
 /// false.
 pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -> Result<Run> {
-    let Replay { tree, path, policy, residency, backend, mut inspector, options } = replay;
-    let mut engine = Engine::start(tree, policy, residency, backend, options.target_ms)?;
+    let Replay { tree, path, policy, residency, backend, costs, mut inspector, options } = replay;
+    let mut engine = Engine::start(tree, policy, residency, backend, costs, options.target_ms)?;
     let view =
         |index: usize| View::new(path.frames[index].pose, path.velocity(index), options.size.0);
     let interval_s = |index: usize| match options.pace {
@@ -65,8 +67,8 @@ pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -
             accuracy: None,
         };
         engine.logged(index as u64)?;
-        if let Some(inspector) = inspector.as_mut().filter(|inspector| inspector.wants(index)) {
-            let toggled = record.report.toggles() > 0;
+        let toggled = record.report.toggles() > 0;
+        if let Some(inspector) = inspector.as_mut().filter(|at| at.wants(index, toggled)) {
             let (front, before) = (engine.front().to_vec(), engine.front_before().to_vec());
             let (front, before) = (&front[..], toggled.then_some(&before[..]));
             engine.inspect(&view, &mut |drawn| {

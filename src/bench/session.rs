@@ -9,8 +9,7 @@ use super::{
 };
 use crate::Result;
 use crate::camera::CameraPath;
-use crate::engine::Policy;
-use crate::engine::policies::lakhia::Lakhia;
+use crate::engine::{CostModel, Policy};
 use crate::format::Scene;
 use crate::loading::NodeFiles;
 use crate::render::content::{held_bytes, picture_bytes};
@@ -65,6 +64,7 @@ impl Session {
             path_name: String::new(), // a path does not know where it is from
             options,
             policy: policy.name(),
+            diagnostics: policy.diagnostics(),
             clock: "model",
             constants: ClockConstants::default(),
             scene_fingerprint: hexadecimal(&self.scene.fingerprint),
@@ -81,23 +81,23 @@ impl Session {
     pub fn run_model(
         &self,
         path: &CameraPath,
-        mut options: BenchOptions,
+        options: BenchOptions,
         constants: ClockConstants,
         inspector: Option<&mut dyn FrameInspector>,
         progress: impl FnMut(&FrameRecord) -> bool,
     ) -> Result<(Run, Context)> {
-        options.selection.time = constants.time_model();
         options.check()?;
-        let mut policy = Lakhia::new(options.selection);
+        let mut policy = options.policy.make()?;
         let tree = self.tree_for(&constants);
-        let context = Context { constants, ..self.context(options, path, &policy) };
-        let mut backend = ModelBackend::new(&tree, constants);
+        let context = Context { constants, ..self.context(options.clone(), path, &*policy) };
+        let mut backend = ModelBackend::new(&tree, constants, options.seed);
         let replay = Replay {
             tree: &tree,
             path,
-            policy: &mut policy,
+            policy: &mut *policy,
             residency: self.residency(&options)?,
             backend: &mut backend,
+            costs: CostModel::new(&constants.prices),
             inspector: match inspector {
                 Some(inspector) => Some(inspector), // for as long as this run
                 None => None,
@@ -108,13 +108,13 @@ impl Session {
     }
 
     /// Replays a path on a graphics adapter, by the clock on the wall. Where `constants` are
-    /// given, they are what selection expects of time at first; otherwise the roots are timed
+    /// given, their prices are what is expected of time at first; otherwise the roots are timed
     /// from places on the path.
     #[cfg(feature = "render")]
     pub fn run_wall(
         &self,
         path: &CameraPath,
-        mut options: BenchOptions,
+        options: BenchOptions,
         constants: Option<ClockConstants>,
         renderer: &mut crate::render::Renderer,
         snapshots: Option<super::Snapshots>,
@@ -126,17 +126,14 @@ impl Session {
         let residency = self.residency(&options)?;
         let weight = constants.unwrap_or_default();
         let tree = self.tree_for(&weight);
-        let measured = super::measure_start(renderer, &tree, self.files(), path)?;
-        let constants = constants.unwrap_or(ClockConstants {
-            fixed_ms: measured.fixed_ms,
-            ms_per_cost: measured.ms_per_cost,
-            fill_cost: measured.fill_cost,
-            ..ClockConstants::default()
-        });
-        options.selection.time = constants.time_model();
-        // The overhead is that of this machine and this size of picture in any case.
-        options.selection.time.fixed_ms = measured.fixed_ms;
-        let mut policy = Lakhia::new(options.selection);
+        let constants = match constants {
+            Some(constants) => constants,
+            None => ClockConstants {
+                prices: super::measure_start(renderer, &tree, self.files(), path)?,
+                ..ClockConstants::default()
+            },
+        };
+        let mut policy = options.policy.make()?;
         let adapter = serde_json::to_value(renderer.adapter()).map_err(|error| {
             crate::Error::Internal(format!("an adapter without JSON form: {error}"))
         })?;
@@ -144,7 +141,7 @@ impl Session {
             constants,
             clock: "wall",
             adapter: Some(adapter),
-            ..self.context(options, path, &policy)
+            ..self.context(options.clone(), path, &*policy)
         };
         let mut backend = super::GpuBackend::new(
             &tree,
@@ -156,9 +153,10 @@ impl Session {
         let replay = Replay {
             tree: &tree,
             path,
-            policy: &mut policy,
+            policy: &mut *policy,
             residency,
             backend: &mut backend,
+            costs: CostModel::new(&constants.prices),
             inspector: match inspector {
                 Some(inspector) => Some(inspector), // for as long as this run
                 None => None,

@@ -26,6 +26,8 @@ pub struct Context {
     pub options: BenchOptions,
     /// Name of the policy.
     pub policy: &'static str,
+    /// Names of what the policy says of itself.
+    pub diagnostics: &'static [&'static str],
     /// `wall` or `model`.
     pub clock: &'static str,
     /// The constants of the clock.
@@ -101,6 +103,12 @@ pub fn summary(run: &Run, context: &Context) -> Value {
             "estimate_error_percent":
                 error(frames, |frame| frame.report.estimated_without_feedback_ms),
         },
+        // Of whole frames, uploads included, by the engine's cost model.
+        "modelled_error_percent": error_of(
+            frames,
+            |frame| frame.report.frame_ms,
+            |frame| frame.report.modelled_ms,
+        ),
         "toggles": {
             "up": up,
             "down": down,
@@ -188,10 +196,16 @@ pub(super) fn error_percent(actual_ms: f64, estimated_ms: f64) -> Option<f64> {
 }
 
 fn error(frames: &[FrameRecord], estimate: fn(&FrameRecord) -> f64) -> Value {
-    let errors: Vec<f64> = frames
-        .iter()
-        .filter_map(|frame| error_percent(frame.report.actual_ms, estimate(frame)))
-        .collect();
+    error_of(frames, |frame| frame.report.actual_ms, estimate)
+}
+
+fn error_of(
+    frames: &[FrameRecord],
+    actual: fn(&FrameRecord) -> f64,
+    estimate: fn(&FrameRecord) -> f64,
+) -> Value {
+    let errors: Vec<f64> =
+        frames.iter().filter_map(|frame| error_percent(actual(frame), estimate(frame))).collect();
     json!({ "mean": mean(errors.iter().copied()), "sd": deviation(&errors) })
 }
 

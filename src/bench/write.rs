@@ -44,7 +44,7 @@ pub fn write_run(
     let text = serde_json::to_string_pretty(summary)
         .map_err(|error| Error::Internal(format!("a summary that has no JSON form: {error}")))?;
     let files = [
-        ("frames.csv", frames_csv(run, context.levels)?),
+        ("frames.csv", frames_csv(run, context)?),
         ("summary.json", (text + "\n").into_bytes()),
         ("report.html", report_html(run, context, summary)?.into_bytes()),
     ]
@@ -54,10 +54,10 @@ pub fn write_run(
 }
 
 /// The frames as CSV.
-pub(super) fn frames_csv(run: &Run, levels: usize) -> Result<Vec<u8>> {
+pub(super) fn frames_csv(run: &Run, context: &Context) -> Result<Vec<u8>> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     let internal = |error: csv::Error| Error::Internal(format!("frames as CSV: {error}"));
-    csv.write_record(FrameRecord::header(levels)).map_err(internal)?;
+    csv.write_record(FrameRecord::header(context.levels, context.diagnostics)).map_err(internal)?;
     for frame in &run.frames {
         csv.write_record(frame.fields()).map_err(internal)?;
     }

@@ -12,6 +12,7 @@ mod raster;
 mod search;
 mod stand;
 mod streets;
+mod sudden;
 mod survey;
 mod terrain;
 #[cfg(test)]
@@ -56,6 +57,10 @@ pub enum PathKind {
     Still,
     /// At the same place, sways back and forth and turns a little
     Shake,
+    /// At the same place, looks away, and back, each at once
+    Turn,
+    /// From the same place to where all of the city is in view in one second, and back
+    Rise,
 }
 
 impl PathKind {
@@ -65,7 +70,8 @@ impl PathKind {
             Self::Walk | Self::Drive | Self::Orbit => 1200,
             Self::Fly => 900,
             Self::Still => 300,
-            Self::Shake => 720,
+            Self::Shake | Self::Turn => 720,
+            Self::Rise => 1080,
         }
     }
 }
@@ -97,6 +103,8 @@ pub fn make_path(
         PathKind::Orbit => orbit::path(ground, frames),
         PathKind::Still => stand::still(ground, frames, seed),
         PathKind::Shake => stand::shake(ground, frames, fps, seed),
+        PathKind::Turn => sudden::turn(ground, frames, fps, seed),
+        PathKind::Rise => sudden::rise(ground, frames, fps, seed),
     };
     let frame = |(eye, frame): (Eye, u64)| PathFrame {
         frame,

@@ -152,6 +152,16 @@ impl CostModel {
         Estimate { mean_ms, deviation_ms: self.relative_deviation() * mean_ms }
     }
 
+    /// The same without what was learned from frames, milliseconds.
+    pub fn expected_ms(&self, load: &Load) -> f64 {
+        dot(&self.expected, &load.terms())
+    }
+
+    /// Milliseconds that a load adds to a frame that is drawn anyway.
+    pub fn added_ms(&self, load: &Load) -> f64 {
+        dot(&self.prices, &load.terms()) - self.prices[0]
+    }
+
     /// Mean of (estimated − actual) / actual over the frames of late.
     pub fn relative_bias(&self) -> f64 {
         let [frames, sum, _] = self.errors;

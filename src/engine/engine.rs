@@ -2,17 +2,34 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use super::predict::predict;
 use super::{
-    Backend, FrameInput, FrameOutcome, FrameReport, FrontCheck, Inspect, Policy, Residents,
-    Selection,
+    Backend, CostModel, FrameEstimate, FrameInput, FrameLoad, FrameOutcome, FrameReport,
+    FrontCheck, Inspect, Policy, PredictedView, Residents, Selection, ToggleCauses,
 };
-use crate::camera::View;
-use crate::runtime::residency::Residency;
+use crate::camera::{Pose, View};
+use crate::runtime::residency::{Changes, Counters, MemoryUse, Residency};
 use crate::runtime::{SceneTree, ToggleCounter};
 use crate::{Error, Result};
 
 /// Nodes in memory whose priority is renewed in each frame though nothing visited them.
 const STALE_PER_FRAME: usize = 64;
+
+/// What the policy sees; a macro, so that the other fields stay free to be changed.
+macro_rules! frame_input {
+    ($engine:ident, $view:expr) => {
+        FrameInput {
+            tree: $engine.tree,
+            view: $view,
+            predicted: &$engine.predicted,
+            residents: &$engine.residents,
+            memory: $engine.memory,
+            costs: &$engine.costs,
+            target_ms: $engine.target_ms,
+            dt_s: $engine.dt_s,
+        }
+    };
+}
 
 /// Draws frame after frame of a scene.
 pub struct Engine<'a> {
@@ -20,10 +37,15 @@ pub struct Engine<'a> {
     policy: &'a mut dyn Policy,
     residency: Arc<Mutex<Residency>>,
     backend: &'a mut dyn Backend,
+    costs: CostModel,
     target_ms: f64,
     /// Seconds since the frame before began.
     dt_s: f64,
+    /// The camera of the frame before.
+    pose: Option<Pose>,
+    predicted: Vec<PredictedView>,
     residents: Residents,
+    memory: MemoryUse,
     selection: Selection,
     /// The front of the frame before.
     before: Vec<u32>,
@@ -32,8 +54,7 @@ pub struct Engine<'a> {
     stale: Vec<u32>,
     others: Vec<(u32, f64)>,
     /// Counters of residency after the frame before.
-    read_bytes: u64,
-    evictions: u64,
+    counters: Counters,
     frames: u64,
     levels: usize,
     start_bytes: u64,
@@ -45,38 +66,43 @@ pub fn lock(residency: &Mutex<Residency>) -> Result<MutexGuard<'_, Residency>> {
 }
 
 impl<'a> Engine<'a> {
-    /// Loads the roots of a scene, of which a frame may take `target_ms`.
+    /// Loads the roots of a scene, of which a frame may take `target_ms`; `costs` is what is
+    /// expected of frames at first.
     pub fn start(
         tree: &'a SceneTree,
         policy: &'a mut dyn Policy,
         residency: Arc<Mutex<Residency>>,
         backend: &'a mut dyn Backend,
+        costs: CostModel,
         target_ms: f64,
     ) -> Result<Self> {
         backend.load_roots(&residency, tree.roots())?;
-        let (start_bytes, read_bytes) = {
+        let (memory, counters) = {
             let residency = lock(&residency)?;
-            (residency.used_bytes(), residency.counters().read_bytes)
+            (residency.memory_use(), residency.counters())
         };
         Ok(Self {
             tree,
             policy,
             residency,
             backend,
+            costs,
             target_ms,
             dt_s: 0.0,
+            pose: None,
+            predicted: Vec::new(),
             residents: Residents::none(tree.len()),
+            memory,
             selection: Selection::default(),
             before: Vec::new(),
             toggles: ToggleCounter::default(),
             check: FrontCheck::default(),
             stale: Vec::new(),
             others: Vec::new(),
-            read_bytes,
-            evictions: 0,
+            counters,
             frames: 0,
             levels: tree.levels(),
-            start_bytes,
+            start_bytes: memory.used_bytes,
         })
     }
 
@@ -85,19 +111,12 @@ impl<'a> Engine<'a> {
         self.before.clone_from(&self.selection.front);
         let mut report = FrameReport::default();
 
-        let changes = lock(&self.residency)?.begin_frame();
-        for &node in &changes.left {
-            self.residents.set(node, false);
-        }
-        for &node in &changes.arrived {
-            self.residents.set(node, true);
-        }
-        report.arrived = changes.arrived.len() as u32;
+        let changes = self.begin_frame(&mut report)?;
         report.upload_ms = self.backend.apply(&changes)?;
+        predict(self.pose.as_ref(), view, self.dt_s, &mut self.predicted);
 
         let before = self.backend.now_ms();
-        let &mut Self { tree, target_ms, dt_s, ref residents, .. } = self;
-        let input = FrameInput { tree, view, residents, target_ms, dt_s };
+        let input = frame_input!(self, view);
         self.policy.select(&input, &mut self.selection);
         report.select_ms = self.backend.now_ms() - before;
         let front = &self.selection.front;
@@ -105,21 +124,57 @@ impl<'a> Engine<'a> {
             let (policy, frame) = (self.policy.name(), self.frames);
             Error::Internal(format!("policy {policy}, frame {frame}: {fault}"))
         })?;
-        self.set_priorities(view, &mut report)?;
+        self.set_requests(view, &mut report)?;
         self.backend.priorities_set();
 
         let drawn = self.backend.draw(&self.selection.front, view)?;
         report.draw_ms = drawn.draw_ms;
         report.actual_ms = report.select_ms + report.draw_ms;
         report.frame_ms = report.actual_ms + report.upload_ms;
-        self.policy.drawn(&FrameOutcome { actual_ms: report.actual_ms });
-        self.describe(&mut report);
+        self.estimate(view, &changes, &mut report);
+        let &FrameReport { actual_ms, frame_ms, .. } = &report;
+        self.policy.drawn(&FrameOutcome { actual_ms, frame_ms });
+        self.describe(view, &changes, &mut report);
 
         self.backend.end_frame(&self.residency, report.frame_ms, interval_s * 1e3)?;
         self.count(&mut report)?;
         self.frames += 1;
         self.dt_s = (report.frame_ms / 1e3).max(interval_s);
+        self.pose = Some(view.pose);
         Ok(report)
+    }
+
+    /// Takes over what arrived and lets go of what left.
+    fn begin_frame(&mut self, report: &mut FrameReport) -> Result<Changes> {
+        let mut residency = lock(&self.residency)?;
+        let changes = residency.begin_frame(self.dt_s);
+        for &node in &changes.left {
+            self.residents.set(node, false);
+        }
+        for &node in &changes.arrived {
+            self.residents.set(node, true);
+        }
+        self.residents.set_coming(residency.coming());
+        self.memory = residency.memory_use();
+        report.arrived = changes.arrived.len() as u32;
+        report.uploaded_bytes = changes.arrived_bytes;
+        Ok(changes)
+    }
+
+    /// Sets what was expected of a frame beside what it took, and learns from it.
+    fn estimate(&mut self, view: &View, changes: &Changes, report: &mut FrameReport) {
+        let front = FrameLoad::of(self.tree, &self.selection.front, view);
+        let (drawn, whole) = (front.load(view, 0), front.load(view, changes.arrived_bytes));
+        let modelled = self.costs.estimate(&whole);
+        (report.modelled_ms, report.modelled_deviation_ms) =
+            (modelled.mean_ms, modelled.deviation_ms);
+        let estimate = self.selection.estimate.unwrap_or_else(|| FrameEstimate {
+            ms: self.costs.estimate(&drawn).mean_ms,
+            without_feedback_ms: self.costs.expected_ms(&drawn),
+        });
+        report.estimated_ms = estimate.ms;
+        report.estimated_without_feedback_ms = estimate.without_feedback_ms;
+        self.costs.observe(&whole, report.frame_ms, self.dt_s);
     }
 
     /// Nodes that the last frame drew.
@@ -158,30 +213,27 @@ impl<'a> Engine<'a> {
     }
 
     /// Tells residency what matters now.
-    fn set_priorities(&mut self, view: &View, report: &mut FrameReport) -> Result<()> {
+    fn set_requests(&mut self, view: &View, report: &mut FrameReport) -> Result<()> {
         let mut residency = lock(&self.residency)?;
         residency.stale(STALE_PER_FRAME, &mut self.stale);
         self.others.clear();
-        let &mut Self { tree, target_ms, dt_s, ref residents, .. } = self;
-        let input = FrameInput { tree, view, residents, target_ms, dt_s };
-        let priority = |&node: &u32| (node, self.policy.priority(&input, node));
-        self.others.extend(self.stale.iter().map(priority));
-        let Selection { front, priorities, keep_visited, .. } = &self.selection;
-        residency.set_priorities(priorities, &self.others);
+        let input = frame_input!(self, view);
+        let utility = |&node: &u32| (node, self.policy.utility(&input, node));
+        self.others.extend(self.stale.iter().map(utility));
+        let Selection { front, requests, released, keep_visited, .. } = &self.selection;
+        residency.set_priorities(requests, &self.others);
         residency.set_needed(front.iter().copied());
         if *keep_visited {
-            residency.set_needed(priorities.iter().map(|&(node, _)| node));
+            residency.set_needed(requests.iter().map(|&(node, _)| node));
         }
+        residency.release(released);
         report.waiting = residency.waiting() as u32;
         Ok(())
     }
 
-    fn describe(&mut self, report: &mut FrameReport) {
+    fn describe(&mut self, view: &View, changes: &Changes, report: &mut FrameReport) {
         let selection = &self.selection;
-        report.estimated_ms = selection.estimated_ms;
-        report.estimated_without_feedback_ms = selection.estimated_without_feedback_ms;
-        (report.v_time, report.share_ms) = (selection.v_time, selection.share_ms);
-        report.covered = selection.covered;
+        report.diagnostics.clone_from(&selection.diagnostics);
         (report.visited, report.culled) = (selection.visited() as u32, selection.culled);
         report.nodes = selection.front.len() as u32;
         report.nodes_by_level = vec![0; self.levels];
@@ -194,14 +246,18 @@ impl<'a> Engine<'a> {
         }
         let toggles = self.toggles.count(self.tree, &selection.front);
         (report.toggles_up, report.toggles_down) = (toggles.up, toggles.down);
+        let frame = frame_input!(self, view);
+        report.toggle_causes = ToggleCauses::of(&frame, &self.toggles, changes);
+        report.finer_resident = selection.front.iter().any(|&node| frame.can_refine(node));
     }
 
     fn count(&mut self, report: &mut FrameReport) -> Result<()> {
         let residency = lock(&self.residency)?;
         let counters = residency.counters();
-        report.read_bytes = counters.read_bytes - self.read_bytes;
-        report.evictions = counters.evictions - self.evictions;
-        (self.read_bytes, self.evictions) = (counters.read_bytes, counters.evictions);
+        report.read_bytes = counters.read_bytes - self.counters.read_bytes;
+        report.reread_bytes = counters.reread_bytes - self.counters.reread_bytes;
+        report.evictions = counters.evictions - self.counters.evictions;
+        self.counters = counters;
         report.memory_bytes = residency.used_bytes();
         report.resident = residency.resident() as u32;
         Ok(())

@@ -9,13 +9,22 @@ mod check_front;
 mod cost_model;
 #[expect(clippy::module_inception)]
 mod engine;
+mod frame_load;
 pub mod policies;
 mod policy;
+mod predict;
 mod report;
+mod residents;
+#[cfg(test)]
+pub(crate) mod test_frame;
+mod toggle_causes;
 
 pub use backend::{Backend, Drawn, Inspect};
 pub use check_front::{FrontCheck, FrontFault, FrontRule};
 pub use cost_model::{CostModel, Estimate, Load, Prices};
 pub use engine::{Engine, lock};
-pub use policy::{FrameInput, FrameOutcome, Policy, Residents, Selection};
+pub use frame_load::{FrameLoad, geometry_load};
+pub use policy::{FrameEstimate, FrameInput, FrameOutcome, Policy, PredictedView, Selection};
 pub use report::FrameReport;
+pub use residents::Residents;
+pub use toggle_causes::ToggleCauses;

@@ -1,7 +1,9 @@
-//! The seam at which ways of choosing levels of detail differ.
+//! The boundary at which ways of choosing levels of detail differ.
 
+use super::{CostModel, Residents};
 use crate::camera::View;
 use crate::runtime::SceneTree;
+use crate::runtime::residency::MemoryUse;
 
 /// What a policy sees of a frame.
 #[derive(Clone, Copy, Debug)]
@@ -10,68 +12,79 @@ pub struct FrameInput<'a> {
     pub tree: &'a SceneTree,
     /// The camera.
     pub view: &'a View,
-    /// Which nodes can be drawn now.
+    /// Where the camera is expected to be soon, if it goes on as it does; nearest in time first.
+    pub predicted: &'a [PredictedView],
+    /// Which nodes can be drawn now, and which are on their way.
     pub residents: &'a Residents,
+    /// The memory cap, and what is in use.
+    pub memory: MemoryUse,
+    /// What frames take, as learned from those drawn so far.
+    pub costs: &'a CostModel,
     /// Milliseconds that the frame may take.
     pub target_ms: f64,
     /// Seconds since the frame before began; 0 in the first.
     pub dt_s: f64,
 }
 
-/// Chooses what each frame draws, and says how much each node matters.
+/// A view that is expected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PredictedView {
+    /// Seconds from now.
+    pub after_s: f64,
+    /// The camera.
+    pub view: View,
+}
+
+impl FrameInput<'_> {
+    /// Whether a node may be in view, as far as its box tells.
+    pub fn is_visible(&self, node: u32) -> bool {
+        self.view.frustum.outside(self.tree.node(node).bbox) <= 0.0
+    }
+
+    /// Whether the children of a node can be drawn in its place: it has some, and all of them that
+    /// are in view are resident.
+    pub fn can_refine(&self, node: u32) -> bool {
+        let children = self.tree.children(node);
+        let drawable = |&child: &u32| self.residents.contains(child) || !self.is_visible(child);
+        !children.is_empty() && children.iter().all(drawable)
+    }
+}
+
+/// Chooses what each frame draws, and says how useful it is that nodes be in memory.
 ///
-/// A policy sees the hierarchy, the camera, what is in memory and how long frames took. It reads
+/// A policy sees the hierarchy, the camera, what is in memory and how long frames take. It reads
 /// no files, starts no threads and knows no graphics card, so the same calls give the same choices
 /// on every machine.
 pub trait Policy {
     /// The name by which a person chooses it.
     fn name(&self) -> &'static str;
 
+    /// Names of what [`Selection::diagnostics`] holds; the same in every frame.
+    fn diagnostics(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// Chooses a front: nodes that cover everything visible, none of them above another, all of
     /// them resident. Called once a frame.
     fn select(&mut self, frame: &FrameInput<'_>, out: &mut Selection);
 
-    /// How much a node matters in this frame, on the scale of [`Selection::priorities`]; for
-    /// nodes that [`select`](Policy::select) had no need to visit.
-    fn priority(&self, frame: &FrameInput<'_>, node: u32) -> f64;
+    /// How useful a node is in this frame, on the scale of [`Selection::requests`]; for nodes in
+    /// memory that [`select`](Policy::select) had no need to visit.
+    fn utility(&self, frame: &FrameInput<'_>, node: u32) -> f64;
 
     /// What became of the frame that was chosen last.
-    fn drawn(&mut self, outcome: &FrameOutcome);
+    fn drawn(&mut self, outcome: &FrameOutcome) {
+        let _ = outcome;
+    }
 }
 
 /// What drawing a frame took.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameOutcome {
-    /// Milliseconds from the beginning of selection until the picture was complete.
+    /// Milliseconds from the beginning of selection until the image was complete.
     pub actual_ms: f64,
-}
-
-/// Which nodes can be drawn now.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Residents(Vec<bool>);
-
-impl Residents {
-    /// None of `nodes` nodes.
-    pub fn none(nodes: usize) -> Self {
-        Self(vec![false; nodes])
-    }
-
-    /// All of `nodes` nodes.
-    pub fn all(nodes: usize) -> Self {
-        Self(vec![true; nodes])
-    }
-
-    /// Whether a node can be drawn.
-    pub fn contains(&self, node: u32) -> bool {
-        self.0.get(node as usize).copied().unwrap_or(false)
-    }
-
-    /// Says whether a node can be drawn.
-    pub fn set(&mut self, node: u32, resident: bool) {
-        if let Some(slot) = self.0.get_mut(node as usize) {
-            *slot = resident;
-        }
-    }
+    /// Milliseconds of the whole frame: the same with uploads.
+    pub frame_ms: f64,
 }
 
 /// What a policy chose for a frame; reused from frame to frame.
@@ -79,37 +92,43 @@ impl Residents {
 pub struct Selection {
     /// What is drawn, coarse to fine. Nodes outside of the view are left out.
     pub front: Vec<u32>,
-    /// Every node that was visited, with its priority: how much it matters that it be in memory.
-    pub priorities: Vec<(u32, f64)>,
-    /// Milliseconds that the frame should take.
-    pub estimated_ms: f64,
-    /// The same without any feedback from earlier frames.
-    pub estimated_without_feedback_ms: f64,
-    /// Milliseconds for one unit of cost (`v_time`); 0 where a policy has no such thing.
-    pub v_time: f64,
-    /// Milliseconds that roots share (`shareTime`); 0 where a policy has no such thing.
-    pub share_ms: f64,
-    /// The part of the picture that the front is expected to cover, 0 to 1; 0 where a policy
-    /// does not ask.
-    pub covered: f64,
+    /// Every node that was visited, with its utility: how much it matters that it be in memory, at
+    /// least 0. The most useful node that is not in memory is loaded first, and the least useful
+    /// ones are evicted for it.
+    pub requests: Vec<(u32, f64)>,
+    /// Nodes whose memory may be freed though there is room.
+    pub released: Vec<u32>,
+    /// Milliseconds that the frame should take; `None` for what the [`CostModel`] says.
+    pub estimate: Option<FrameEstimate>,
+    /// In the order of [`Policy::diagnostics`].
+    pub diagnostics: Vec<f64>,
     /// Of the nodes visited, those outside of the view.
     pub culled: u32,
     /// None of the nodes visited is evicted, not only those of the front.
     pub keep_visited: bool,
 }
 
+/// What a policy of its own reckoning expects of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrameEstimate {
+    /// Milliseconds.
+    pub ms: f64,
+    /// The same without any feedback from earlier frames.
+    pub without_feedback_ms: f64,
+}
+
 impl Selection {
     /// Forgets the last frame and keeps the memory.
     pub fn clear(&mut self) {
         self.front.clear();
-        self.priorities.clear();
-        (self.estimated_ms, self.estimated_without_feedback_ms) = (0.0, 0.0);
-        (self.v_time, self.share_ms) = (0.0, 0.0);
-        (self.covered, self.culled, self.keep_visited) = (0.0, 0, false);
+        self.requests.clear();
+        self.released.clear();
+        self.diagnostics.clear();
+        (self.estimate, self.culled, self.keep_visited) = (None, 0, false);
     }
 
     /// Number of nodes visited.
     pub fn visited(&self) -> usize {
-        self.priorities.len()
+        self.requests.len()
     }
 }

@@ -1,5 +1,7 @@
 //! What a frame was and took.
 
+use super::ToggleCauses;
+
 /// What a frame was and took.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameReport {
@@ -17,16 +19,20 @@ pub struct FrameReport {
     pub upload_ms: f64,
     /// Milliseconds to draw.
     pub draw_ms: f64,
-    /// `v_time`, milliseconds for a unit of cost.
-    pub v_time: f64,
-    /// `shareTime` of the roots, milliseconds.
-    pub share_ms: f64,
-    /// The part of the image that the nodes were expected to cover, 0 to 1.
-    pub covered: f64,
+    /// Milliseconds that the whole frame was expected to take by the engine's cost model.
+    pub modelled_ms: f64,
+    /// Standard deviation of that.
+    pub modelled_deviation_ms: f64,
+    /// What the policy says of itself, by [`Policy::diagnostics`](super::Policy::diagnostics).
+    pub diagnostics: Vec<f64>,
     /// Nodes that gave way to their children.
     pub toggles_up: u32,
     /// Nodes that replaced their children.
     pub toggles_down: u32,
+    /// The same toggles, by what brought them about.
+    pub toggle_causes: ToggleCauses,
+    /// A node that was drawn could have been refined: all of its children in view are in memory.
+    pub finer_resident: bool,
     /// Nodes drawn.
     pub nodes: u32,
     /// Triangles drawn.
@@ -41,6 +47,10 @@ pub struct FrameReport {
     pub resident: u32,
     /// Bytes read from files during the frame.
     pub read_bytes: u64,
+    /// Of these, bytes of nodes that had been in memory before and were evicted.
+    pub reread_bytes: u64,
+    /// Bytes that were uploaded before it.
+    pub uploaded_bytes: u64,
     /// Nodes that became resident before it.
     pub arrived: u32,
     /// Nodes that are wanted and not in memory.

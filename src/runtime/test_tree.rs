@@ -14,16 +14,29 @@ pub(crate) struct Sketch {
     pub cost: f64,
     pub benefit: f64,
     pub normal: [f32; 3],
+    /// As a bound and as a mean, metres.
+    pub error: f64,
+    /// As many vertices too.
+    pub triangles: u32,
     pub children: Vec<Sketch>,
 }
 
 /// A cube of 2 m about `centre`.
 pub(crate) fn sketch(centre: [f64; 3], cost: f64, children: Vec<Sketch>) -> Sketch {
-    Sketch { centre, size: 2.0, cost, benefit: 1.0, normal: [0.0; 3], children }
+    Sketch {
+        centre,
+        size: 2.0,
+        cost,
+        benefit: 1.0,
+        normal: [0.0; 3],
+        error: 0.0,
+        triangles: 10,
+        children,
+    }
 }
 
 /// The scene of some trees: nodes are numbered as they are met, parents first, each tree in full
-/// before the next. Every node has 10 triangles and vertices and a file of 1000 bytes.
+/// before the next. Every node has a file of 1000 bytes.
 pub(crate) fn scene(trees: Vec<Sketch>) -> Scene {
     let mut nodes = Vec::new();
     for tree in trees {
@@ -52,8 +65,10 @@ fn add(nodes: &mut Vec<Node>, sketch: Sketch, parent: Option<u32>, level: u32) {
         parent,
         level,
         block: Some(0),
-        triangles: 10,
-        vertices: 10,
+        triangles: sketch.triangles,
+        vertices: sketch.triangles,
+        geometric_error: sketch.error,
+        mean_error: sketch.error,
         bbox_min: corner(-1.0),
         bbox_max: corner(1.0),
         cost: sketch.cost,

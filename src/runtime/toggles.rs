@@ -21,6 +21,10 @@ pub struct ToggleCounter {
     before: Front,
     now: Front,
     frame: u32,
+    /// Nodes that gave way to their children in the last call.
+    refined: Vec<u32>,
+    /// Nodes that replaced their children in the last call.
+    coarsened: Vec<u32>,
 }
 
 /// A front and all that is above it.
@@ -53,8 +57,8 @@ impl Front {
     }
 
     /// Nodes of `other` that are above its front and stand in or below this one.
-    fn deepened_by(&self, tree: &SceneTree, other: &Front) -> u32 {
-        let covered = |&&node: &&u32| {
+    fn deepened_by(&self, tree: &SceneTree, other: &Front, nodes: &mut Vec<u32>) {
+        let covered = |&&node: &&u32| -> bool {
             let mut at = Some(node);
             while let Some(above) = at {
                 if self.drawn[above as usize] == self.frame {
@@ -64,7 +68,8 @@ impl Front {
             }
             false
         };
-        other.above.iter().filter(covered).count() as u32
+        nodes.clear();
+        nodes.extend(other.above.iter().filter(covered));
     }
 }
 
@@ -77,10 +82,19 @@ impl ToggleCounter {
         if self.frame == 1 {
             return Toggles::default();
         }
-        Toggles {
-            up: self.before.deepened_by(tree, &self.now),
-            down: self.now.deepened_by(tree, &self.before),
-        }
+        self.before.deepened_by(tree, &self.now, &mut self.refined);
+        self.now.deepened_by(tree, &self.before, &mut self.coarsened);
+        Toggles { up: self.refined.len() as u32, down: self.coarsened.len() as u32 }
+    }
+
+    /// Nodes that gave way to their children in the last call.
+    pub fn refined(&self) -> &[u32] {
+        &self.refined
+    }
+
+    /// Nodes that replaced their children in the last call.
+    pub fn coarsened(&self) -> &[u32] {
+        &self.coarsened
     }
 }
 

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::format::Scene;
+use crate::format::{Node, Scene};
 
 /// What selection knows of a node. Indices are those of [`Scene::nodes`].
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +26,14 @@ pub struct TreeNode {
     pub geometric_error: f64,
     /// Number of triangles.
     pub triangles: u32,
+    /// Number of triangles with a texture.
+    pub textured_triangles: u32,
+    /// Number of vertices.
+    pub vertices: u32,
+    /// Draw calls, one a texture and one for what has none; at least 1.
+    pub draws: u32,
+    /// Mean distance to the source, metres.
+    pub mean_error: f64,
     /// Steps from the root.
     pub level: u32,
     /// The coarser node, unless this is a root.
@@ -69,6 +77,10 @@ impl SceneTree {
                 average_normal: DVec3::from(node.average_normal.map(f64::from)),
                 geometric_error: node.geometric_error,
                 triangles: node.triangles,
+                textured_triangles: node.textured_triangles,
+                vertices: node.vertices,
+                draws: draws(node),
+                mean_error: node.mean_error,
                 level: node.level,
                 parent: node.parent,
                 children: first..indices.len() as u32,
@@ -141,6 +153,11 @@ impl SceneTree {
     pub fn middle(&self) -> DVec3 {
         (self.bounds[0] + self.bounds[1]) / 2.0
     }
+}
+
+fn draws(node: &Node) -> u32 {
+    let textures = (node.pictures.len() + node.shared_textures.len()) as u32;
+    (textures + u32::from(node.textured_triangles < node.triangles)).max(1)
 }
 
 #[cfg(test)]

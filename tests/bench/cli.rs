@@ -51,9 +51,10 @@ fn help_names_every_option_with_its_unit_and_range() {
         "make-path",
         "calibrate",
         "milliseconds that a frame may take, above 0 [default: 30]",
-        "0-1",
-        "Seconds by which",
-        "in metres, above 0",
+        "[default: best-first]",
+        "screen-error-loop",
+        "--set <CONSTANT=VALUE>",
+        "0 or more [default: 0.1]",
         "KiB, MiB or GiB [default: 1GiB]",
         "[default: 64KiB]",
         "in pixels [default: 1280x720]",
@@ -72,6 +73,14 @@ fn help_names_every_option_with_its_unit_and_range() {
     {
         assert!(make_path.contains(part), "{part:?} is not in\n{make_path}");
     }
+    let policies = help(&["policies", "--help"]);
+    for part in ["--list", "in milliseconds, above 0", "1 or more", "--pops"] {
+        assert!(policies.contains(part), "{part:?} is not in\n{policies}");
+    }
+    let list = help(&["policies", "--list"]);
+    for part in ["best-first (default)", "lakhia", "--set hyst_switch=1500", "0 to 1"] {
+        assert!(list.contains(part), "{part:?} is not in\n{list}");
+    }
     assert!(help(&["calibrate", "--help"]).contains("--constants"));
     assert!(help(&["--version"]).contains(env!("CARGO_PKG_VERSION")));
 }
@@ -89,14 +98,15 @@ fn bad_usage_is_refused_with_the_range() {
         (&["--target-ms", "NaN"], &["--target-ms", "above 0", "NaN"]),
         (&["--target-ms", "inf"], &["--target-ms", "above 0", "inf"]),
         (&["--target-ms", "soon"], &["--target-ms", "soon"]),
-        (&["--hyst-switch", "0"], &["--hyst-switch", "above 0"]),
-        (&["--hyst-switch", "200", "--hyst-limit", "199"], &["--hyst-limit", "--hyst-switch"]),
-        (&["--fore", "1.5"], &["--fore", "0 to 1", "1.5"]),
-        (&["--vis", "-1"], &["--vis", "at least 0"]),
-        (&["--lookahead", "-1"], &["--lookahead", "at least 0"]),
-        (&["--least-distance", "0"], &["--least-distance", "above 0"]),
-        (&["--v-time-gain", "2"], &["--v-time-gain", "0 to 1"]),
-        (&["--share-gain", "1"], &["--share-gain"]),
+        (&["--policy", "latest"], &["--policy", "latest", "lakhia", "best-first"]),
+        (&["--policy", "lakhia", "--set", "hyst_switch=0"], &["hyst_switch", "found 0"]),
+        (&["--policy", "lakhia", "--set", "fore=1.5"], &["fore", "0 to 1", "1.5"]),
+        (&["--policy", "lakhia", "--set", "vis=-1"], &["vis", "found -1"]),
+        (&["--policy", "lakhia", "--set", "v_time_gain=2"], &["v_time_gain", "0 to 1"]),
+        (&["--set", "vis"], &["--set", "hyst_switch=50"]),
+        (&["--set", "vis=NaN"], &["--set", "hyst_switch=50"]),
+        (&["--policy", "lakhia", "--set", "colour=1"], &["colour", "lakhia", "hyst_limit"]),
+        (&["--policy", "screen-area", "--set", "vis=1"], &["vis", "screen-area", "expand"]),
         (&["--evict-margin", "-0.1"], &["--evict-margin", "at least 0"]),
         (&["--chunk", "0"], &["--chunk", "at least 1 byte"]),
         (&["--max-memory", "lots"], &["--max-memory", "512MiB"]),
@@ -215,9 +225,11 @@ fn constants_that_are_none_are_refused() {
         ("mine".into(), &["constants"]),
         ("{}".into(), &["version"]),
         (with("version", 99.into()), &["version", "99"]),
-        (with("ms_per_cost", 0.into()), &["ms_per_cost", "above 0"]),
-        (with("ms_per_cost", "fast".into()), &["constants"]),
-        (with("fixed_ms", (-1).into()), &["fixed_ms", "at least 0"]),
+        (with("version", 2.into()), &["version", "expected 3", "calibrate again"]),
+        (with("noise", "loud".into()), &["constants"]),
+        (with("noise", (-1).into()), &["noise", "at least 0"]),
+        (with("overlap", 2.into()), &["overlap", "0 to 1"]),
+        (with("prices", 1.into()), &["constants"]),
         (with("load_bytes_per_ms", 0.into()), &["load_bytes_per_ms", "above 0"]),
         (with("textured_weight", 2.into()), &["textured_weight", "0 to 1"]),
         (with("colour", 2.into()), &["colour"]),

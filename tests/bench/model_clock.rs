@@ -3,9 +3,12 @@
 use std::sync::{Arc, Mutex};
 
 use glam::DVec3;
-use hlod::bench::{BenchOptions, ClockConstants, FrameRecord, ModelBackend, Replay, run};
+use hlod::bench::{
+    BenchOptions, ClockConstants, FrameRecord, ModelBackend, PolicyChoice, Replay, run,
+};
 use hlod::camera::{CameraPath, PathFrame, Pose, from_angles};
-use hlod::engine::policies::lakhia::Lakhia;
+use hlod::engine::CostModel;
+use hlod::engine::policies::Settings;
 use hlod::format::Scene;
 use hlod::mesh::UpAxis;
 use hlod::runtime::SceneTree;
@@ -54,26 +57,23 @@ fn replay(scene: &Scene, frames: usize, target_ms: f64) -> Vec<FrameRecord> {
     };
     let path = CameraPath { frames: (0..frames).map(frame).collect() };
     let tree = SceneTree::new(scene);
-    let constants = ClockConstants {
-        fixed_ms: 0.5,
-        ms_per_cost: 0.001,
-        fill_cost: 0.0,
-        ms_per_node: 0.0,
-        ..ClockConstants::default()
-    };
-    let mut options = BenchOptions { target_ms, ..BenchOptions::default() };
-    options.selection.share_limit = 1.0;
-    options.selection.time = constants.time_model();
+    // 0.1 ms for each node.
+    let mut constants = ClockConstants::default();
+    constants.prices.triangle = 1e-3;
+    // Of a policy that draws what fits and no more.
+    let policy = PolicyChoice::new("best-first", &Settings::new()).unwrap();
+    let options = BenchOptions { target_ms, policy, ..BenchOptions::default() };
     let sizes = Sizes::new(scene, |vertices, _, _| u64::from(vertices) * 24, |_| 0);
     let residency = Residency::new(&tree, sizes, options.residency).unwrap();
-    let mut policy = Lakhia::new(options.selection);
-    let mut backend = ModelBackend::new(&tree, constants);
+    let mut policy = options.policy.make().unwrap();
+    let mut backend = ModelBackend::new(&tree, constants, options.seed);
     let replay = Replay {
         tree: &tree,
         path: &path,
-        policy: &mut policy,
+        policy: &mut *policy,
         residency: Arc::new(Mutex::new(residency)),
         backend: &mut backend,
+        costs: CostModel::new(&constants.prices),
         inspector: None,
         options,
     };

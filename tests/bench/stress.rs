@@ -109,7 +109,7 @@ impl Rig {
     /// A frame: takes over what arrived, and asks for what `priorities` says of the nodes that
     /// selection would visit: roots, and children of what is resident.
     pub fn frame(&mut self, mut priority: impl FnMut(u32) -> Option<f64>) {
-        let changes = self.residency.lock().unwrap().begin_frame();
+        let changes = self.residency.lock().unwrap().begin_frame(1.0 / 30.0);
         for arrival in self.thread.arrivals() {
             match arrival {
                 Ok(arrival) => drop(self.arrived.insert(arrival.node, arrival)),

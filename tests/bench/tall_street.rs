@@ -41,6 +41,8 @@ fn add(
         bbox_max: at.map(|centre| centre + size / 2.0),
         cost: 100.0,
         static_benefit: size,
+        geometric_error: size * size / 100.0,
+        mean_error: size * size / 1000.0,
         file: format!("n{index}.glb"),
         file_bytes: 1000,
         ..Node::default()

@@ -121,7 +121,11 @@ fn a_run_goes_on_with_the_parent_of_a_node_that_is_damaged() {
         let root = scene.nodes[inner(&scene) as usize].parent.unwrap();
         let file = node_file(&place, inner(&scene));
         (damage.apply)(&file);
-        let Some(done) = wall(&place, "orbit.csv", &["--out", "r", "--all-siblings"]) else {
+        let Some(done) = wall(
+            &place,
+            "orbit.csv",
+            &["--out", "r", "--policy", "lakhia", "--set", "all_siblings=1"],
+        ) else {
             return;
         };
         let name = file.file_name().unwrap().to_str().unwrap().to_owned();
@@ -139,7 +143,9 @@ fn a_run_goes_on_with_the_parent_of_a_node_that_is_damaged() {
     }
     // It is the damage that keeps the root there.
     let place = Place::new(city());
-    wall(&place, "orbit.csv", &["--out", "r", "--all-siblings"]).unwrap().success();
+    wall(&place, "orbit.csv", &["--out", "r", "--policy", "lakhia", "--set", "all_siblings=1"])
+        .unwrap()
+        .success();
     assert_eq!(place.frames("r").column("nodes_level_0")[0], 0.0);
 }
 

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use glam::{DMat3, DQuat, DVec3};
 use hlod::Result;
-use hlod::bench::{BenchOptions, ClockConstants, Session};
+use hlod::bench::{BenchOptions, ClockConstants, PolicyChoice, Session};
 use hlod::builder::hierarchy::HierarchyOptions;
 use hlod::builder::progress::Silent;
 use hlod::builder::{BuildOptions, build};
@@ -90,20 +90,25 @@ impl Chain {
         figures.add_build(&self.built, &self.report, scale);
         let session = Session::open(&self.out()).unwrap();
         let (run, _) = session
-            .run_model(path, bench_options(scale), ClockConstants::default(), None, |_| true)
+            .run_model(path, bench_options(), ClockConstants::default(), None, |_| true)
             .unwrap();
         figures.add_run(&run);
         figures
     }
 }
 
-/// A target that shows some of all levels, and counters that switch within so few frames.
-pub fn bench_options(scale: f64) -> BenchOptions {
-    let mut options = BenchOptions { target_ms: 10.0, ..BenchOptions::default() };
-    options.selection.hyst_switch = 10.0;
-    options.selection.hyst_limit = 30.0;
-    options.selection.least_distance = scale;
-    options
+/// A target that shows some of all levels.
+pub fn bench_options() -> BenchOptions {
+    BenchOptions { target_ms: 10.0, ..BenchOptions::default() }
+}
+
+/// The thesis's policy, which looks at costs, benefits and normals, with counters that switch
+/// within so few frames.
+pub fn thesis_options(fore: f64) -> BenchOptions {
+    let set = [("hyst_switch", 10.0), ("hyst_limit", 30.0), ("fore", fore)];
+    let settings = set.map(|(name, value)| (name.to_owned(), value)).into();
+    let policy = PolicyChoice::new("lakhia", &settings).unwrap();
+    BenchOptions { policy, ..bench_options() }
 }
 
 /// A change of place: `scale × turn × point + offset`.

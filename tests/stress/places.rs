@@ -170,9 +170,10 @@ fn what_is_turned_is_as_good() {
         ("nodes", 0.4),
         ("triangles drawn", 0.2),
         ("toggles", 0.2),
-        // They follow the nodes and triangles drawn.
-        ("frame", 0.15),
-        ("expected", 0.15),
+        // They follow the nodes and triangles drawn, and the part of the image under the boxes,
+        // which are larger around what is turned.
+        ("frame", 0.25),
+        ("expected", 0.25),
     ];
     let why = "other planes cut other chunks, small ones at the corners of the box";
     table.within("hills, by 37.3°", &chain.figures(&odd.path(&path), 1.0), &twin, bounds, why);

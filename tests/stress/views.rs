@@ -6,7 +6,7 @@ use hlod::camera::{CameraPath, PathFrame, Pose, format_path, looking_at, parse_p
 use hlod::format::{SCENE_FILE, Scene};
 use hlod::mesh::UpAxis;
 
-use crate::chain::{Chain, bench_options, options};
+use crate::chain::{Chain, bench_options, options, thesis_options};
 use crate::figures::Figures;
 use crate::shape::{Shape, hill};
 use crate::table::{Table, Twin};
@@ -87,8 +87,8 @@ fn patched(benefit: f64) -> hlod::Result<Scene> {
 fn views_at_their_limits() {
     let mut table = Table::new("9-views", "Cameras and constants at their limits");
     let hills = Hills::new(&Shape::hills());
-    let usual = bench_options(1.0);
-    let replay = |path: &CameraPath| hills.replay(path, usual, clock());
+    let usual = bench_options();
+    let replay = |path: &CameraPath| hills.replay(path, usual.clone(), clock());
     let mut check = |name: &str,
                      case: hlod::Result<Figures>,
                      twin: &str,
@@ -147,7 +147,7 @@ fn views_at_their_limits() {
     check("infinite velocity", replay(&leaping(1e-310)), "of 1e300 m/s", replay(&leaping(1e-300)));
 
     let target = |target_ms| {
-        let mut bench = usual;
+        let mut bench = usual.clone();
         bench.target_ms = target_ms;
         hills.replay(&still(place, 60.0), bench, clock())
     };
@@ -157,13 +157,13 @@ fn views_at_their_limits() {
     let bare = || Hills::new(&Shape::hills().without_texture());
     let with_cost = |textured_weight| {
         let clock = ClockConstants { textured_weight, ..clock() };
-        bare().replay(&still(place, 60.0), usual, clock)
+        bare().replay(&still(place, 60.0), thesis_options(0.45), clock)
     };
     check("costs of 0", with_cost(1.0), "of 1e-9 a triangle", with_cost(1.0 - 1e-9));
     let with_benefit = |benefit: f64| {
         let hills =
             bare().with(|scene| scene.nodes.iter_mut().for_each(|n| n.static_benefit = benefit))?;
-        hills.replay(&still(place, 60.0), usual, clock())
+        hills.replay(&still(place, 60.0), thesis_options(0.45), clock())
     };
     check("benefits of 1e-300", with_benefit(1e-300), "of 1", with_benefit(1.0));
     check("benefits of 1e100", with_benefit(1e100), "of 1", with_benefit(1.0));
@@ -172,9 +172,7 @@ fn views_at_their_limits() {
     let with_normal = |normal: [f32; 3], fore: f64| {
         let hills =
             bare().with(|scene| scene.nodes.iter_mut().for_each(|n| n.average_normal = normal))?;
-        let mut bench = usual;
-        bench.selection.fore = fore;
-        hills.replay(&still(place, 60.0), bench, clock())
+        hills.replay(&still(place, 60.0), thesis_options(fore), clock())
     };
     check(
         "normals that cancel",

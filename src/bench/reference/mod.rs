@@ -28,6 +28,7 @@ pub struct Reference {
     renderer: ReferenceRenderer,
     leaves: Vec<u32>,
     every: u64,
+    every_toggle: bool,
     tolerance: SilhouetteTolerance,
     worst: Vec<WorstFrame>,
 }
@@ -45,7 +46,20 @@ impl Reference {
         let leaves =
             (0..tree.len() as u32).filter(|&node| tree.children(node).is_empty()).collect();
         let renderer = ReferenceRenderer::new(session, options, CAP_BYTES)?;
-        Ok(Self { renderer, leaves, every: every.max(1), tolerance, worst: Vec::new() })
+        Ok(Self {
+            renderer,
+            leaves,
+            every: every.max(1),
+            every_toggle: false,
+            tolerance,
+            worst: Vec::new(),
+        })
+    }
+
+    /// Inspects every frame in which levels toggled as well.
+    pub fn with_every_toggle(mut self) -> Self {
+        self.every_toggle = true;
+        self
     }
 
     /// What a summary and a report say of it.
@@ -83,8 +97,8 @@ impl Reference {
 }
 
 impl FrameInspector for Reference {
-    fn wants(&self, index: usize) -> bool {
-        (index as u64).is_multiple_of(self.every)
+    fn wants(&self, index: usize, toggled: bool) -> bool {
+        (index as u64).is_multiple_of(self.every) || (self.every_toggle && toggled)
     }
 
     fn inspect(&mut self, sample: FrameSample<'_>) -> Result<Accuracy> {

@@ -7,7 +7,7 @@ use crate::bench::FrameRecord;
 use crate::bench::statistics::mean;
 use crate::bench::summary::error_percent;
 
-pub(super) fn figures(frames: &[FrameRecord]) -> Vec<Figure> {
+pub(super) fn figures(frames: &[FrameRecord], diagnostics: &[&str]) -> Vec<Figure> {
     let frame = Places::frames(frames);
     let without = of(frames, |frame| {
         error_percent(frame.report.actual_ms, frame.report.estimated_without_feedback_ms)
@@ -46,10 +46,7 @@ pub(super) fn figures(frames: &[FrameRecord]) -> Vec<Figure> {
         moving_average(&known)
     });
     let (y, count) = range(&averages.concat(), &[]);
-    let v_time = of(frames, |frame| frame.report.v_time * 1e3);
-    let (low, high) =
-        v_time.iter().fold((f64::INFINITY, 0f64), |(low, high), &v| (low.min(v), high.max(v)));
-    vec![
+    let mut figures = vec![
         panel(
             "6.4 (a)",
             "Estimate against actual time, without feedback",
@@ -65,17 +62,6 @@ pub(super) fn figures(frames: &[FrameRecord]) -> Vec<Figure> {
             BLUE,
             "The same for the estimate that follows the measured time of earlier frames.",
         ),
-        Figure {
-            number: "6.4 (c)",
-            title: "v_time",
-            caption: "Time that selection expects of one unit of cost, as feedback moves it."
-                .into(),
-            plot: Plot {
-                x: frame.axis(),
-                y: Axis { label: "µs a unit of cost".into(), range: padded(low, high) },
-                layers: vec![Layer::new("v_time", BLUE, Shape::Line(frame.points(&v_time)))],
-            },
-        },
         Figure {
             number: "6.4 (d)",
             title: "Both, averaged",
@@ -93,7 +79,31 @@ pub(super) fn figures(frames: &[FrameRecord]) -> Vec<Figure> {
                 ],
             },
         },
-    ]
+    ];
+    if let Some(at) = diagnostics.iter().position(|&name| name == "v_time") {
+        let last = figures.len() - 1;
+        figures.insert(last, v_time(frames, &frame, at));
+    }
+    figures
+}
+
+/// The diagnostic `v_time`, which is the one at `at`.
+fn v_time(frames: &[FrameRecord], frame: &Places, at: usize) -> Figure {
+    let of_frame =
+        |frame: &FrameRecord| frame.report.diagnostics.get(at).map_or(f64::NAN, |v| v * 1e3);
+    let v_time: Vec<f64> = frames.iter().map(of_frame).collect();
+    let (low, high) =
+        v_time.iter().fold((f64::INFINITY, 0f64), |(low, high), &v| (low.min(v), high.max(v)));
+    Figure {
+        number: "6.4 (c)",
+        title: "v_time",
+        caption: "Time that selection expects of one unit of cost, as feedback moves it.".into(),
+        plot: Plot {
+            x: frame.axis(),
+            y: Axis { label: "µs a unit of cost".into(), range: padded(low, high) },
+            layers: vec![Layer::new("v_time", BLUE, Shape::Line(frame.points(&v_time)))],
+        },
+    }
 }
 
 /// A range with some room on both sides.

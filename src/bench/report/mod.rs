@@ -8,6 +8,7 @@ mod figures;
 mod frame_time;
 mod memory;
 mod plot;
+mod policies;
 mod sections;
 mod series;
 mod sweep;
@@ -23,6 +24,7 @@ use serde_json::Value;
 use super::{Context, Run};
 use crate::Result;
 use figures::Figure;
+pub use policies::policies_html;
 use sections::{Section, sections};
 pub use sweep::sweep_html;
 

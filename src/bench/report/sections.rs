@@ -17,7 +17,7 @@ pub(super) fn sections(run: &Run, context: &Context) -> Vec<Section> {
     let mut sections = vec![
         section("Memory and loading", memory::figures(run, context)),
         section("Level of detail", detail::figures(frames, context.levels)),
-        section("Accuracy of estimated time", estimate::figures(frames)),
+        section("Accuracy of estimated time", estimate::figures(frames, context.diagnostics)),
         section("Frame time", frame_time::figures(frames, context)),
         section("Toggles", toggles::figures(frames)),
     ];

@@ -26,7 +26,7 @@ fn frames(count: usize, levels: usize) -> Run {
                 estimated_without_feedback_ms: ms * (0.8 + 0.4 * noise()),
                 actual_ms: ms,
                 frame_ms: ms + noise(),
-                v_time: 0.0025 + 0.0002 * noise(),
+                diagnostics: vec![0.0025 + 0.0002 * noise()],
                 toggles_up: u32::from(noise() < 0.1) * 3,
                 toggles_down: u32::from(noise() < 0.1),
                 nodes: nodes_by_level.iter().sum(),
@@ -56,6 +56,7 @@ fn context(levels: usize) -> Context {
         path_name: "walk.csv".into(),
         options: BenchOptions::default(),
         policy: "lakhia",
+        diagnostics: &["v_time"],
         clock: "model",
         constants: ClockConstants::default(),
         scene_fingerprint: "5ce9e".into(),
@@ -116,7 +117,7 @@ fn a_page_has_each_figure_with_axes_legend_and_a_sentence() {
         "thousand triangles",
         "city along walk.csv",
         "5ce9e",
-        "selection.hyst_switch",
+        "policy.constants.cooldown_s",
         "−2.01 %",
         "15.19 %",
         "walk 133, drive 11",
@@ -220,7 +221,7 @@ fn frames_that_are_no_numbers_do_not_reach_the_page() {
     run.frames[3].report.frame_ms = f64::NAN;
     run.frames[4].report.estimated_ms = 0.0;
     run.frames[5].report.actual_ms = f64::INFINITY;
-    run.frames[6].report.v_time = f64::NAN;
+    run.frames[6].report.diagnostics = vec![f64::NAN];
     check(&page(&run, &context(2)));
 }
 

@@ -2,7 +2,6 @@
 
 mod backend;
 mod calibrate;
-mod fit;
 mod measurement_scene;
 mod process;
 mod snapshots;

@@ -1,5 +1,6 @@
 //! `hlod-bench OUT PATH.csv`: arguments in, exit code out.
 
+mod policies;
 mod run_args;
 
 use std::io::{IsTerminal, Write};
@@ -14,11 +15,12 @@ use hlod::bench::{
 use hlod::camera::{self, CameraPath, DEFAULT_FPS, Ground, PathKind};
 use hlod::{Error, Result};
 use indicatif::{ProgressBar, ProgressStyle};
+use policies::PoliciesArgs;
 use run_args::{Clock, RunArgs, parse_size};
 
 /// Replays a camera path over a built scene and measures frame times, toggles, memory and image error.
 ///
-/// Selects levels of detail for every frame as in Lakhia's thesis (2004), loads nodes in another
+/// Selects levels of detail for every frame by one of several policies, loads nodes in another
 /// thread within a memory cap, draws offscreen, and writes frames.csv, summary.json and report.html
 /// into the folder --out.
 #[derive(Parser, Debug)]
@@ -27,7 +29,7 @@ use run_args::{Clock, RunArgs, parse_size};
     allow_negative_numbers = true,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    override_usage = "hlod-bench [OPTIONS] OUT PATH.csv\n       hlod-bench make-path [OPTIONS] OUT --kind KIND --out PATH.csv\n       hlod-bench calibrate [OPTIONS] OUT --out CLOCK.json\n       hlod-bench sweep [OPTIONS] OUT PATH.csv --targets MS,MS\n       hlod-bench compare [OPTIONS] BASE.json NEW.json",
+    override_usage = "hlod-bench [OPTIONS] OUT PATH.csv\n       hlod-bench make-path [OPTIONS] OUT --kind KIND --out PATH.csv\n       hlod-bench calibrate [OPTIONS] OUT --out CLOCK.json\n       hlod-bench sweep [OPTIONS] OUT PATH.csv --targets MS,MS\n       hlod-bench policies [OPTIONS] OUT...\n       hlod-bench compare [OPTIONS] BASE.json NEW.json",
     after_help = "Examples:\n  hlod-bench make-path out/ --kind walk --out walk.csv\n  hlod-bench out/ walk.csv --target-ms 30\n  hlod-bench out/ walk.csv --clock model --max-memory 256MiB --out bench/walk\n\nExit codes: 0 success, 1 internal error, 2 usage, 3 input missing or invalid (also where a run went on without a node file that cannot be used), 4 output not written, 5 no graphics adapter, 6 compare: a limit was exceeded."
 )]
 struct Cli {
@@ -46,7 +48,8 @@ enum Command {
         scene: PathBuf,
         /// walk and drive: along the streets at 1.5 and 15 m/s; fly: from a street up and over
         /// the city; orbit: a circle and two passes through the middle; still: no motion;
-        /// shake: small swaying motion
+        /// shake: small swaying motion; turn: looks away and back at once; rise: from a street to
+        /// above the city in a second, and back
         #[arg(long, value_enum)]
         kind: PathKind,
         /// Frames, 1 or more [default: what suits the kind]
@@ -87,6 +90,9 @@ enum Command {
         #[command(flatten)]
         run: Box<RunArgs>,
     },
+    /// Runs all policies along the same paths by the model clock, and writes image error against
+    /// frame time, late frames, toggles and loading as policies.csv, policies.json and policies.html
+    Policies(Box<PoliciesArgs>),
     /// Measures the constants of the model clock on this machine
     Calibrate {
         /// The output folder of hlod-build
@@ -132,6 +138,7 @@ fn main() -> ExitCode {
         Some(Command::Calibrate { scene, adapter, size, out }) => {
             calibrate(&scene, adapter, size, &out)
         }
+        Some(Command::Policies(arguments)) => policies::policies(&arguments),
         Some(Command::Sweep { targets, run }) => sweep(&targets, &run),
         None => replay(&cli.run),
     };
@@ -219,7 +226,7 @@ fn replay_once(arguments: &RunArgs) -> Result<(serde_json::Value, Option<Error>)
     let path_name = path.display().to_string();
     let path = camera::read_path(path, session.scene().up)?;
     let constants = arguments.constants.as_deref().map(ClockConstants::read).transpose()?;
-    let options = arguments.options(&session);
+    let options = arguments.options()?;
     options.check()?;
     check_output(&arguments.out)?;
     let bar = Bar::new(arguments.quiet, path.frames.len());
@@ -319,12 +326,18 @@ fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Res
     let constants = session.calibrate(&path, &mut renderer)?;
     constants.write(out)?;
     print(&format!(
-        "an empty frame    {:.2} ms\na unit of cost    {:.6} ms\nthe whole image   {:.0} units of cost\na node            {:.4} ms\n\
-         loading           {:.1} MB/s\nc_textured        {:.3}\nwritten: {}\n",
-        constants.fixed_ms,
-        constants.ms_per_cost,
-        constants.fill_cost,
-        constants.ms_per_node,
+        "an empty frame       {:.2} ms\na draw call          {:.4} ms\n\
+         1000 vertices        {:.4} ms\n1000 triangles       {:.4} ms\n\
+         1e6 plain fragments  {:.3} ms\n1e6 textured ones    {:.3} ms\n\
+         noise                {:.1} %\nloading              {:.1} MB/s\n\
+         c_textured           {:.3}\nwritten: {}\n",
+        constants.prices.frame,
+        constants.prices.draw,
+        constants.prices.vertex * 1e3,
+        constants.prices.triangle * 1e3,
+        constants.prices.plain_fragment * 1e6,
+        constants.prices.textured_fragment * 1e6,
+        constants.noise * 100.0,
         constants.load_bytes_per_ms / 1e3,
         constants.textured_weight,
         out.display()

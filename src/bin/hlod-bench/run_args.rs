@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
-use hlod::bench::{BenchOptions, Pace, Session, Size};
-use hlod::engine::policies::lakhia::{LakhiaOptions, ShareFeedback, StartOfHysteresis};
+use hlod::Result;
+use hlod::bench::{BenchOptions, Pace, PolicyChoice, Size};
+use hlod::engine::policies::{POLICIES, Settings};
 use hlod::runtime::residency::ResidencyOptions;
 
-const LAKHIA: LakhiaOptions = LakhiaOptions::DEFAULT;
 const RESIDENCY: ResidencyOptions = ResidencyOptions::DEFAULT;
 
 /// A scene, a path, and all that determines a run.
@@ -34,6 +34,9 @@ pub struct RunArgs {
     /// When the next frame begins: `recorded`, not before its time in the path; `unthrottled`, at once
     #[arg(long, value_enum, default_value_t = Pace::Recorded)]
     pub pace: Pace,
+    /// Seed of the model clock's noise and stalls
+    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    pub seed: u64,
     /// Warm-up frames at the first pose, before the log begins
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub warm_up_frames: u64,
@@ -44,51 +47,12 @@ pub struct RunArgs {
     /// c_targetTime: milliseconds that a frame may take, above 0 [default: 30]
     #[arg(long, value_name = "MS", help_heading = "Selection")]
     pub target_ms: Option<f64>,
-    /// c_vis: weight of visibility in a node's benefit, 0 or more
-    #[arg(long, value_name = "C", default_value_t = LAKHIA.vis, help_heading = "Selection")]
-    pub vis: f64,
-    /// c_fore: weight of foreshortening in a node's benefit, 0-1
-    #[arg(long, value_name = "C", default_value_t = LAKHIA.fore, help_heading = "Selection")]
-    pub fore: f64,
-    /// c_hystSwitch: value at which a hysteresis counter takes effect, above 0. More: fewer and
-    /// later toggles
-    #[arg(long, value_name = "C", default_value_t = LAKHIA.hyst_switch, help_heading = "Selection")]
-    pub hyst_switch: f64,
-    /// c_hystLimit: largest magnitude of a hysteresis counter, --hyst-switch or more
-    #[arg(long, value_name = "C", default_value_t = LAKHIA.hyst_limit, help_heading = "Selection")]
-    pub hyst_limit: f64,
-    /// Where hysteresis counters start: `affordable` draws nodes at once only where their time
-    /// slice suffices
-    #[arg(long, value_enum, default_value_t = LAKHIA.hyst_start, help_heading = "Selection")]
-    pub hyst_start: StartOfHysteresis,
-    /// Seconds by which the camera is extrapolated before distances are measured, 0 or more
-    #[arg(long, value_name = "S", default_value_t = LAKHIA.lookahead_s, help_heading = "Selection")]
-    pub lookahead: f64,
-    /// Least distance of a node in metres, above 0; nearer ones count as this far [default: 1, less
-    /// in scenes below 100 m]
-    #[arg(long, value_name = "M", help_heading = "Selection")]
-    pub least_distance: Option<f64>,
-    /// Draw children only where all of them are in memory, rather than all that are in view
-    #[arg(long, help_heading = "Selection")]
-    pub all_siblings: bool,
-    /// Gain of the feedback on v_time, the time of a unit of cost, 0-1; 0 turns it off
-    #[arg(long, value_name = "PART", default_value_t = LAKHIA.v_time_gain, help_heading = "Selection")]
-    pub v_time_gain: f64,
-    /// Gain of the feedback on shareTime, the time that is divided among the nodes, 0-1; 0 turns
-    /// it off
-    #[arg(long, value_name = "PART", default_value_t = LAKHIA.share_gain, help_heading = "Selection")]
-    pub share_gain: f64,
-    /// Fraction of the target by which frames must miss it before shareTime changes, 0 or more
-    #[arg(long, value_name = "PART", default_value_t = LAKHIA.share_slack, help_heading = "Selection")]
-    pub share_slack: f64,
-    /// Largest shareTime, as a multiple of the time that the target leaves for nodes, 1 or more.
-    /// More: finer where little is in view, but later back on target when more comes into view
-    #[arg(long, value_name = "TIMES", default_value_t = LAKHIA.share_limit, help_heading = "Selection")]
-    pub share_limit: f64,
-    /// Feedback on shareTime: `plain`, the thesis's, which oscillates; `damped` waits for pending
-    /// changes
-    #[arg(long, value_enum, default_value_t = LAKHIA.share_feedback, help_heading = "Selection")]
-    pub share_feedback: ShareFeedback,
+    /// How levels of detail are chosen; `hlod-bench policies --list` describes each
+    #[arg(long, value_name = "NAME", default_value = POLICIES[0].name, value_parser = POLICIES.map(|kind| kind.name), help_heading = "Selection")]
+    pub policy: String,
+    /// Sets a constant of the policy; may be given several times
+    #[arg(long, value_name = "CONSTANT=VALUE", value_parser = parse_setting, help_heading = "Selection")]
+    pub set: Vec<(String, f64)>,
 
     /// maxMemory: memory cap in bytes, loads in progress included; with KiB, MiB or GiB
     #[arg(long, value_name = "BYTES", default_value_t = Bytes(RESIDENCY.max_memory_bytes), help_heading = "Memory and loading")]
@@ -166,7 +130,7 @@ impl fmt::Display for Bytes {
 impl FromStr for Bytes {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
         let units =
             [("KiB", 10), ("MiB", 20), ("GiB", 30), ("K", 10), ("M", 20), ("G", 30), ("B", 0)];
         let (number, shift) = units
@@ -184,14 +148,14 @@ impl FromStr for Bytes {
     }
 }
 
-fn parse_not_negative(text: &str) -> Result<f64, String> {
+fn parse_not_negative(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number >= 0.0 && number.is_finite() => Ok(number),
         _ => Err("expected a number of 0 or more".into()),
     }
 }
 
-pub fn parse_size(text: &str) -> Result<Size, String> {
+pub fn parse_size(text: &str) -> std::result::Result<Size, String> {
     let wanted = "expected width and height in pixels, such as 1280x720";
     let (width, height) = text.split_once('x').ok_or(wanted)?;
     let side = |text: &str| match text.parse::<u32>() {
@@ -201,27 +165,21 @@ pub fn parse_size(text: &str) -> Result<Size, String> {
     Ok(Size([side(width)?, side(height)?]))
 }
 
+fn parse_setting(text: &str) -> std::result::Result<(String, f64), String> {
+    let wanted = "expected the name of a constant and a number, such as hyst_switch=50";
+    let (name, value) = text.split_once('=').ok_or(wanted)?;
+    match value.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok((name.trim().replace('-', "_"), value)),
+        _ => Err(wanted.into()),
+    }
+}
+
 impl RunArgs {
-    pub fn options(&self, session: &Session) -> BenchOptions {
-        let least = (session.tree().diagonal() / 100.0).clamp(1e-6, 1.0);
-        BenchOptions {
+    pub fn options(&self) -> Result<BenchOptions> {
+        let settings: Settings = self.set.iter().cloned().collect();
+        Ok(BenchOptions {
             target_ms: self.target_ms.unwrap_or(BenchOptions::TARGET_MS),
-            selection: LakhiaOptions {
-                vis: self.vis,
-                fore: self.fore,
-                hyst_switch: self.hyst_switch,
-                hyst_limit: self.hyst_limit,
-                hyst_start: self.hyst_start,
-                lookahead_s: self.lookahead,
-                least_distance: self.least_distance.unwrap_or(least),
-                all_siblings: self.all_siblings,
-                v_time_gain: self.v_time_gain,
-                share_gain: self.share_gain,
-                share_slack: self.share_slack,
-                share_limit: self.share_limit,
-                share_feedback: self.share_feedback,
-                ..LakhiaOptions::default()
-            },
+            policy: PolicyChoice::new(&self.policy, &settings)?,
             residency: ResidencyOptions {
                 max_memory_bytes: self.max_memory.0,
                 chunk_bytes: self.chunk.0,
@@ -231,6 +189,7 @@ impl RunArgs {
             pace: self.pace,
             size: self.size,
             warm_up_frames: self.warm_up_frames,
-        }
+            seed: self.seed,
+        })
     }
 }

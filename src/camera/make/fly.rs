@@ -23,7 +23,7 @@ const LOOK_DOWN_DEG: f64 = 10.0;
 /// 1 / sin 30°.
 pub(super) const WHOLE_IN_VIEW: f64 = 2.05;
 /// Degrees above the horizon at which all of it comes into view, and the highest over it.
-const LOWEST_DEG: f64 = 30.0;
+pub(super) const LOWEST_DEG: f64 = 30.0;
 const HIGHEST_DEG: f64 = 70.0;
 
 pub(super) fn path(ground: &Ground, frames: usize, fps: f64, seed: u64) -> Vec<Eye> {

@@ -35,7 +35,7 @@ fn place(ground: &Ground, seed: u64) -> Option<(glam::DVec3, f64)> {
 }
 
 /// Where one stands, in any scene.
-fn stand(ground: &Ground, seed: u64) -> (glam::DVec3, f64) {
+pub(super) fn stand(ground: &Ground, seed: u64) -> (glam::DVec3, f64) {
     place(ground, seed).unwrap_or_else(|| {
         let start = Circuit::around(ground, 0.0).start();
         let towards = ground.sphere().0 - start;

@@ -11,6 +11,9 @@ use crate::runtime::SceneTree;
 use crate::runtime::residency::{ResidencyOptions, Sizes};
 use crate::runtime::test_tree::{scene, sketch};
 
+/// Seconds of a frame.
+const FRAME_S: f64 = 1.0 / 30.0;
+
 /// Far more than anything here takes.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -70,7 +73,7 @@ fn load(
     let start = Instant::now();
     loop {
         let mut residency = residency.lock().unwrap();
-        residency.begin_frame();
+        residency.begin_frame(FRAME_S);
         residency.set_priorities(&[(0, 9.0), (1, 3.0), (2, 2.0), (3, 1.0)], &[]);
         if done(&thread, &residency) || start.elapsed() > PATIENCE {
             errors.extend(thread.arrivals().filter_map(Result::err).map(|e| e.to_string()));
@@ -113,7 +116,7 @@ fn nothing_is_loaded_while_the_thread_stands_still_and_all_of_it_afterwards() {
     let (_folder, residency, thread) = rig(nothing);
     let ask = || {
         let mut residency = residency.lock().unwrap();
-        residency.begin_frame();
+        residency.begin_frame(FRAME_S);
         residency.set_priorities(&[(0, 9.0), (1, 3.0), (2, 2.0), (3, 1.0)], &[]);
         drop(residency);
         thread.wake();

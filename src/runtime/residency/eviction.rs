@@ -93,14 +93,28 @@ impl Residency {
             self.forget_load(other, NodeState::Absent);
             self.counters.abandoned += 1;
         }
-        for &other in &victims {
-            self.states[other as usize] = NodeState::Leaving;
-            self.list.set_loaded(other, false);
-            self.resident -= 1;
-        }
-        self.counters.evictions += victims.len() as u64;
-        self.leaving.extend(victims);
+        victims.into_iter().for_each(|other| self.leave(other));
         true
+    }
+
+    /// Evicts nodes though nothing else needs their memory: those that the last frame neither
+    /// drew nor visited, and that have no children in memory.
+    pub fn release(&mut self, nodes: &[u32]) {
+        for &node in nodes {
+            let wanted = [self.visited[node as usize], self.needed[node as usize]];
+            if !wanted.contains(&self.frame) && self.may_leave(node, &[]) {
+                self.leave(node);
+            }
+        }
+    }
+
+    /// A node's memory is free from the next frame on.
+    fn leave(&mut self, node: u32) {
+        self.states[node as usize] = NodeState::Leaving;
+        self.list.set_loaded(node, false);
+        self.resident -= 1;
+        self.counters.evictions += 1;
+        self.leaving.push(node);
     }
 
     /// A load under way that is of less importance than `priority`, or that nobody asks for.

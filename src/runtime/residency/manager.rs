@@ -28,6 +28,8 @@ pub struct Step {
 pub struct Changes {
     /// Nodes that become resident.
     pub arrived: Vec<u32>,
+    /// Bytes that these hold for drawing, shared textures apart.
+    pub arrived_bytes: u64,
     /// Nodes whose memory is to be freed.
     pub left: Vec<u32>,
     /// Shared pictures whose memory is to be freed.
@@ -47,10 +49,12 @@ impl Residency {
             children_held: vec![0; nodes],
             to_read: vec![0; nodes],
             textures_held: vec![false; sizes.textures.len()],
+            loaded_before: vec![false; nodes],
             visited: vec![0; nodes],
             recent_priority: RecentPriority::new(nodes),
             needed: vec![0; nodes],
             frame: 0,
+            now_s: 0.0,
             missed: Vec::new(),
             arrivals: Vec::new(),
             leaving: Vec::new(),
@@ -58,6 +62,7 @@ impl Residency {
             loading: Vec::new(),
             current: None,
             resident: 0,
+            requested_bytes: 0,
             cursor: 0,
             counters: Counters::default(),
             options,
@@ -105,7 +110,9 @@ impl Residency {
     pub fn set_priorities(&mut self, visited: &[(u32, f64)], others: &[(u32, f64)]) {
         self.frame += 1;
         self.missed.clear();
+        self.requested_bytes = 0;
         for &(node, _) in visited {
+            self.requested_bytes += self.sizes.nodes[node as usize].held_bytes;
             self.visited[node as usize] = self.frame;
             if self.states[node as usize] != NodeState::Resident {
                 self.missed.push(node);
@@ -114,7 +121,7 @@ impl Residency {
                 self.needed[parent as usize] = self.frame;
             }
         }
-        self.recent_priority.update(self.frame, visited);
+        self.recent_priority.update(self.now_s, visited);
         self.list.update(visited);
         self.list.update(others);
     }
@@ -201,6 +208,7 @@ impl Residency {
         let NodeState::Loading { read } = &mut self.states[node as usize] else { return false };
         *read += bytes;
         self.counters.read_bytes += bytes;
+        self.counters.reread_bytes += if self.loaded_before[node as usize] { bytes } else { 0 };
         *read >= self.to_read[node as usize]
     }
 
@@ -210,6 +218,7 @@ impl Residency {
             return;
         }
         self.end_reading(node);
+        self.loaded_before[node as usize] = true;
         self.states[node as usize] = NodeState::Loaded;
         for &texture in &self.sizes.nodes[node as usize].textures {
             self.textures_held[texture as usize] = true;
@@ -231,8 +240,10 @@ impl Residency {
     }
 
     /// What drawing takes over and lets go of before it draws a frame. After this call arrived
-    /// nodes are resident and the memory of those that left is free.
-    pub fn begin_frame(&mut self) -> Changes {
+    /// nodes are resident and the memory of those that left is free. `dt_s` is the seconds since the
+    /// frame before began.
+    pub fn begin_frame(&mut self, dt_s: f64) -> Changes {
+        self.now_s += dt_s.max(0.0);
         let mut changes = Changes::default();
         for node in std::mem::take(&mut self.leaving) {
             self.forget(node, NodeState::Absent, &mut changes.left_textures);
@@ -258,6 +269,7 @@ impl Residency {
         changes.arrived = self.arrivals.drain(..taken).collect();
         for &node in &changes.arrived {
             self.states[node as usize] = NodeState::Resident;
+            changes.arrived_bytes += self.sizes.nodes[node as usize].held_bytes;
         }
         self.resident += taken;
         changes

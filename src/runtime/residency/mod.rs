@@ -17,4 +17,4 @@ pub use list::PriorityList;
 pub use manager::{Changes, Step};
 pub use options::ResidencyOptions;
 pub use sizes::{NodeSize, Sizes, TextureSize};
-pub use state::{Counters, NodeState, Residency};
+pub use state::{Counters, MemoryUse, NodeState, Residency};

@@ -1,7 +1,7 @@
 //! What nodes were worth lately.
 
-/// Frames for which a node stays worth what it was, at least; twice as many at most.
-const KEPT_FRAMES: u64 = 30;
+/// Seconds for which a node stays worth what it was, at least; twice as many at most.
+const KEPT_S: f64 = 1.0;
 
 /// The highest priority that nodes had lately.
 ///
@@ -10,7 +10,7 @@ const KEPT_FRAMES: u64 = 30;
 /// another that is not worth more than both.
 #[derive(Clone, Debug)]
 pub(super) struct RecentPriority {
-    /// The span of [`KEPT_FRAMES`] frames at hand.
+    /// The span of [`KEPT_S`] seconds at hand.
     span: u64,
     nodes: Vec<Recent>,
 }
@@ -39,9 +39,10 @@ impl RecentPriority {
         Self { span: 0, nodes: vec![Recent::default(); nodes] }
     }
 
-    /// Takes the priorities of the nodes that a frame visited; frames come in order.
-    pub fn update(&mut self, frame: u64, visited: &[(u32, f64)]) {
-        self.span = frame / KEPT_FRAMES;
+    /// Takes the priorities of the nodes that a frame visited, at a time that is never before the
+    /// last.
+    pub fn update(&mut self, now_s: f64, visited: &[(u32, f64)]) {
+        self.span = self.span.max((now_s / KEPT_S) as u64);
         for &(node, priority) in visited {
             let recent = &mut self.nodes[node as usize];
             let [highest, before] = recent.at(self.span);
@@ -62,20 +63,25 @@ mod tests {
 
     #[test]
     fn what_a_node_was_worth_is_kept_for_a_while_and_not_for_ever() {
-        for first in [0, 1, 17, KEPT_FRAMES - 1, KEPT_FRAMES] {
-            let mut recent = RecentPriority::new(2);
-            recent.update(first, &[(0, 5.0), (1, 1.0)]);
-            for after in 1..=3 * KEPT_FRAMES {
-                recent.update(first + after, &[(1, 2.0)]);
-                match after {
-                    ..=KEPT_FRAMES => assert_eq!(recent.of(0), 5.0, "{first} {after}"),
-                    _ if after >= 2 * KEPT_FRAMES => assert_eq!(recent.of(0), 0.0),
-                    _ => assert!([0.0, 5.0].contains(&recent.of(0))),
+        for first in [0.0, 0.03, 0.57, 0.97, 1.0] {
+            for frames_per_s in [20, 200] {
+                let mut recent = RecentPriority::new(2);
+                recent.update(first, &[(0, 5.0), (1, 1.0)]);
+                for frame in 1..=3 * frames_per_s {
+                    let after_s = f64::from(frame) / f64::from(frames_per_s);
+                    recent.update(first + after_s, &[(1, 2.0)]);
+                    if after_s < KEPT_S {
+                        assert_eq!(recent.of(0), 5.0, "{first} {after_s}");
+                    } else if after_s >= 2.0 * KEPT_S {
+                        assert_eq!(recent.of(0), 0.0);
+                    } else {
+                        assert!([0.0, 5.0].contains(&recent.of(0)));
+                    }
+                    assert_eq!(recent.of(1), 2.0);
                 }
-                assert_eq!(recent.of(1), 2.0);
+                recent.update(first + 3.1 * KEPT_S, &[(0, 1.0)]);
+                assert_eq!(recent.of(0), 1.0);
             }
-            recent.update(first + 3 * KEPT_FRAMES + 1, &[(0, 1.0)]);
-            assert_eq!(recent.of(0), 1.0);
         }
     }
 }

@@ -24,11 +24,24 @@ pub enum NodeState {
     Broken,
 }
 
+/// Bytes against the cap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MemoryUse {
+    /// What may be in use at most, loads under way included.
+    pub cap_bytes: u64,
+    /// What is in use.
+    pub used_bytes: u64,
+    /// What all that the last frame asked for takes, in memory or not, shared textures apart.
+    pub requested_bytes: u64,
+}
+
 /// What has happened so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counters {
     /// Bytes of files that were read.
     pub read_bytes: u64,
+    /// Of these, bytes of nodes that had been loaded before.
+    pub reread_bytes: u64,
     /// Nodes that were loaded.
     pub loads: u64,
     /// Nodes that were evicted.
@@ -58,12 +71,16 @@ pub struct Residency {
     pub(super) to_read: Vec<u64>,
     /// By shared picture: whether it is in memory.
     pub(super) textures_held: Vec<bool>,
+    /// By node: whether it was ever loaded.
+    pub(super) loaded_before: Vec<bool>,
     /// By node: the frame in which it was visited last.
     pub(super) visited: Vec<u64>,
     pub(super) recent_priority: RecentPriority,
     /// By node: the last frame in which it was drawn, or its children were visited in its place.
     pub(super) needed: Vec<u64>,
     pub(super) frame: u64,
+    /// Seconds since the first frame.
+    pub(super) now_s: f64,
     /// Nodes that the last frame visited and that were not resident.
     pub(super) missed: Vec<u32>,
     /// Loaded, in the order in which they were.
@@ -78,6 +95,8 @@ pub struct Residency {
     /// The load that was given the last chunk.
     pub(super) current: Option<u32>,
     pub(super) resident: usize,
+    /// Bytes that the nodes of the last frame's requests take.
+    pub(super) requested_bytes: u64,
     /// Where [`Residency::stale`] goes on.
     pub(super) cursor: usize,
     pub(super) counters: Counters,
@@ -108,6 +127,20 @@ impl Residency {
     /// The most bytes that were ever in use.
     pub fn peak_bytes(&self) -> u64 {
         self.budget.peak()
+    }
+
+    /// The cap, and the bytes in use.
+    pub fn memory_use(&self) -> MemoryUse {
+        MemoryUse {
+            cap_bytes: self.options.max_memory_bytes,
+            used_bytes: self.used_bytes(),
+            requested_bytes: self.requested_bytes,
+        }
+    }
+
+    /// Nodes that are being read, or were read and are not yet resident.
+    pub fn coming(&self) -> impl Iterator<Item = u32> {
+        self.loading.iter().chain(&self.arrivals).copied()
     }
 
     /// Number of nodes that can be drawn.

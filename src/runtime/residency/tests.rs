@@ -5,6 +5,9 @@ use crate::random::Random;
 use crate::runtime::SceneTree;
 use crate::runtime::test_tree::{Sketch, sketch, tree};
 
+/// Seconds of a frame.
+const FRAME_S: f64 = 1.0 / 30.0;
+
 const HELD: u64 = 500;
 const FILE: u64 = 1000;
 
@@ -34,7 +37,7 @@ fn started(tree: &SceneTree, sizes: Sizes, options: ResidencyOptions) -> Residen
         assert!(residency.chunk_read(root, step.bytes));
         residency.loaded(root);
     }
-    assert_eq!(residency.begin_frame().arrived, tree.roots());
+    assert_eq!(residency.begin_frame(FRAME_S).arrived, tree.roots());
     residency
 }
 
@@ -85,7 +88,7 @@ fn load_all(residency: &mut Residency) -> Vec<u32> {
 fn settle(residency: &mut Residency, priorities: &[(u32, f64)]) -> (Vec<u32>, Vec<u32>) {
     let (mut loaded, mut left) = (Vec::new(), Vec::new());
     for _ in 0..130 {
-        left.extend(residency.begin_frame().left);
+        left.extend(residency.begin_frame(FRAME_S).left);
         residency.set_priorities(priorities, &[]);
         loaded.extend(load_all(residency));
     }
@@ -99,7 +102,7 @@ fn the_most_important_node_is_loaded_first_and_children_after_their_parent() {
     let priorities = [(0, 9.0), (1, 3.0), (4, 5.0), (2, 8.0), (3, 7.0), (5, 1.0), (6, 2.0)];
     residency.set_priorities(&priorities, &[]);
     assert_eq!(load_all(&mut residency), [4, 1], "children wait for their parents to arrive");
-    residency.begin_frame();
+    residency.begin_frame(FRAME_S);
     residency.set_priorities(&priorities, &[]);
     assert_eq!(load_all(&mut residency), [2, 3, 6, 5]);
 }
@@ -169,7 +172,7 @@ fn nearly_equal_priorities_do_not_push_each_other_out() {
     let before = residency.counters();
     for frame in 0..200 {
         let sway = if frame % 2 == 0 { 0.04 } else { -0.04 };
-        residency.begin_frame();
+        residency.begin_frame(FRAME_S);
         residency.set_priorities(&[(0, 9.0), (1, 1.0 + sway), (4, 1.0 - sway)], &[]);
         load_all(&mut residency);
         check(&residency, &tree, &sizes(7), cap);
@@ -226,7 +229,7 @@ fn a_shared_picture_is_held_once_and_leaves_with_its_last_user() {
     let mut residency = started(&tree, sizes.clone(), options(cap));
     residency.set_priorities(&[(0, 9.0), (1, 3.0), (4, 2.0)], &[]);
     load_all(&mut residency);
-    residency.begin_frame();
+    residency.begin_frame(FRAME_S);
     // The second user finds the picture in memory and reads its own file only.
     assert_eq!(residency.counters().read_bytes, 3 * FILE + 10);
     assert_eq!(residency.used_bytes(), 3 * HELD + 70);
@@ -245,13 +248,13 @@ fn uploads_of_a_frame_are_bounded_but_one_always_comes() {
     let mut residency = started(&tree, sizes(6), bounded);
     residency.set_priorities(&[(0, 9.0), (1, 5.0), (2, 4.0), (3, 3.0), (4, 2.0), (5, 1.0)], &[]);
     load_all(&mut residency);
-    let arrived: Vec<_> = (0..4).map(|_| residency.begin_frame().arrived).collect();
+    let arrived: Vec<_> = (0..4).map(|_| residency.begin_frame(FRAME_S).arrived).collect();
     assert_eq!(arrived, [vec![1, 2], vec![3, 4], vec![5], vec![]]);
     let tiny = ResidencyOptions { upload_bytes: 1, ..options(1 << 20) };
     let mut residency = started(&tree, sizes(6), tiny);
     residency.set_priorities(&[(0, 9.0), (1, 5.0), (2, 4.0)], &[]);
     load_all(&mut residency);
-    assert_eq!(residency.begin_frame().arrived, [1]);
+    assert_eq!(residency.begin_frame(FRAME_S).arrived, [1]);
 }
 
 #[test]
@@ -303,7 +306,7 @@ fn promises_hold_whatever_happens() {
         for _ in 0..300 {
             match random(4) {
                 0 => {
-                    let changes = residency.begin_frame();
+                    let changes = residency.begin_frame(FRAME_S);
                     for &node in &changes.left {
                         assert_eq!(residency.state(node), NodeState::Absent);
                     }
@@ -347,7 +350,7 @@ fn pictures_that_only_a_load_kept_are_let_go_of_when_it_is_given_up() {
     let mut residency = started(&tree, sizes.clone(), options(cap));
     residency.set_priorities(&[(0, 9.0), (1, 1.0)], &[]);
     assert_eq!(load_all(&mut residency), [1]);
-    residency.begin_frame();
+    residency.begin_frame(FRAME_S);
     // Another child begins to load and relies on the picture.
     residency.set_priorities(&[(0, 9.0), (2, 7.9)], &[(1, 0.1)]);
     assert_eq!(residency.next_step().map(|step| step.node), Some(2));
@@ -356,13 +359,13 @@ fn pictures_that_only_a_load_kept_are_let_go_of_when_it_is_given_up() {
     residency.set_priorities(&[(0, 9.0), (2, 7.9), (3, 8.0)], &[(1, 0.1)]);
     assert_eq!(residency.next_step().map(|step| step.node), Some(2));
     assert_eq!(residency.state(1), NodeState::Leaving);
-    let changes = residency.begin_frame();
+    let changes = residency.begin_frame(FRAME_S);
     assert_eq!((changes.left, changes.left_textures), (vec![1], vec![]));
     let before = residency.used_bytes();
     residency.broken(2);
     assert_eq!(residency.used_bytes(), before - HELD - FILE, "drawing holds the picture still");
     assert!(residency.has_texture(0));
-    assert_eq!(residency.begin_frame().left_textures, [0]);
+    assert_eq!(residency.begin_frame(FRAME_S).left_textures, [0]);
     assert!(!residency.has_texture(0));
     check(&residency, &tree, &sizes, cap);
 }
@@ -393,7 +396,7 @@ fn stand(tree: &SceneTree, residency: &mut Residency, priority: &[f64], frames: 
     (0..frames)
         .map(|_| {
             let before = residency.counters();
-            residency.begin_frame();
+            residency.begin_frame(FRAME_S);
             let (visited, front) = select(residency, tree, priority);
             residency.set_priorities(&visited, &[]);
             residency.set_needed(front);
@@ -435,7 +438,7 @@ fn a_frame_evicts_for_several_nodes() {
     let settled = |residency: &Residency| (5..9).all(|n| residency.state(n) == NodeState::Resident);
     // What was worth more lately stays for a while.
     while !settled(&residency) {
-        residency.begin_frame();
+        residency.begin_frame(FRAME_S);
         residency.set_priorities(&then, &[]);
         load_all(&mut residency);
         check(&residency, &tree, &sizes(9), cap);
@@ -455,7 +458,7 @@ fn looking_to_and_fro_loads_nothing_again() {
     for frame in 0..600 {
         let seen = |node: u32| ((node - 1) / 4 == frame / 15 % 2) as u8 as f64;
         let all = (1..9).map(|node| (node, 1.0 + 1.275 * seen(node) + 0.01 * f64::from(node)));
-        residency.begin_frame();
+        residency.begin_frame(FRAME_S);
         residency.set_priorities(&[(0, 9.0)].into_iter().chain(all).collect::<Vec<_>>(), &[]);
         let loaded = load_all(&mut residency);
         late += if frame > 60 { loaded.len() } else { 0 };

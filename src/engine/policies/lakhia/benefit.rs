@@ -35,12 +35,17 @@ fn frustum_vis(outside: f64, distance: impl FnOnce() -> f64) -> f64 {
 /// `view` is the normal of the image plane towards the eye, so that what faces the camera gains.
 /// The distance is that of the node's box from the camera moved on by its velocity.
 #[inline(always)] // asked for every node: a call each would take a tenth of selection
-pub(super) fn score(node: &TreeNode, view: &View, options: &LakhiaOptions) -> NodeScore {
+pub(super) fn score(
+    node: &TreeNode,
+    view: &View,
+    least_distance: f64,
+    options: &LakhiaOptions,
+) -> NodeScore {
     let eye = view.pose.position;
     let outside = view.frustum.outside(node.bbox);
     let moved = distance(eye + view.velocity * options.lookahead_s, node.bbox);
-    let distance_now = || distance(eye, node.bbox).max(options.least_distance);
-    let distance = moved.max(options.least_distance);
+    let distance_now = || distance(eye, node.bbox).max(least_distance);
+    let distance = moved.max(least_distance);
     let vis = 1.0 + options.vis * frustum_vis(outside, distance_now);
     let foreshorten = 1.0 + options.fore * (-view.frustum.forward).dot(node.average_normal);
     let benefit = node.static_benefit * vis * foreshorten / (distance * distance);
@@ -58,7 +63,7 @@ mod tests {
     }
 
     fn priority(sketch: Sketch, view: &View, options: &LakhiaOptions) -> f64 {
-        score(tree(vec![sketch]).node(0), view, options).priority
+        score(tree(vec![sketch]).node(0), view, 1.0, options).priority
     }
 
     #[test]

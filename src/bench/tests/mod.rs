@@ -1,5 +1,7 @@
 //! Runs with the model clock over small scenes.
 
+mod loaders;
+
 use std::sync::{Arc, Mutex};
 
 use glam::DVec3;
@@ -7,8 +9,9 @@ use glam::DVec3;
 use super::write::frames_csv;
 use super::*;
 use crate::camera::{CameraPath, PathFrame, Pose, from_angles};
-use crate::engine::policies::lakhia::{Lakhia, TimeModel};
-use crate::engine::{FrameInput, FrameOutcome, Policy, Selection};
+use crate::engine::policies::Settings;
+use crate::engine::test_frame::triangles_alone;
+use crate::engine::{CostModel, FrameInput, Policy, Prices, Selection};
 use crate::format::Scene;
 use crate::mesh::UpAxis;
 use crate::runtime::SceneTree;
@@ -24,7 +27,7 @@ fn street(houses: usize) -> Scene {
                 .map(|side| node([at[0] + side * size / 4.0, at[1], at[2]], size / 2.0, depth - 1))
                 .into(),
         };
-        Sketch { size, benefit: size, ..sketch(at, 100.0, children) }
+        Sketch { size, benefit: size, error: size / 20.0, ..sketch(at, 100.0, children) }
     }
     scene((0..houses).map(|house| node([house as f64 * 20.0, 15.0, 0.0], 16.0, 2)).collect())
 }
@@ -47,17 +50,14 @@ fn walk(frames: usize) -> CameraPath {
 
 fn options(max_memory_bytes: u64) -> BenchOptions {
     let residency = ResidencyOptions { max_memory_bytes, ..ResidencyOptions::default() };
-    let mut options = BenchOptions { target_ms: 3.0, residency, ..BenchOptions::default() };
-    options.selection.time = TimeModel { fixed_ms: 0.5, ms_per_cost: 0.001, fill_cost: 0.0 };
-    options
+    let policy = PolicyChoice::new("lakhia", &Settings::new()).unwrap();
+    BenchOptions { target_ms: 3.0, residency, policy, ..BenchOptions::default() }
 }
 
 fn constants() -> ClockConstants {
     ClockConstants {
-        fixed_ms: 0.5,
-        ms_per_cost: 0.001,
-        fill_cost: 0.0,
-        ms_per_node: 0.0,
+        prices: Prices { frame: 0.5, ..triangles_alone(0.01) },
+        cold_byte: 0.0,
         load_bytes_per_ms: 50.0,
         ..ClockConstants::default()
     }
@@ -76,14 +76,15 @@ fn replay_before(
     let tree = SceneTree::new(scene);
     let sizes = Sizes::new(scene, |vertices, _, _| u64::from(vertices) * 20, |_| 0);
     let residency = Residency::new(&tree, sizes, options.residency).unwrap();
-    let mut policy = Lakhia::new(options.selection);
-    let mut backend = ModelBackend::new(&tree, constants());
+    let mut policy = options.policy.make().unwrap();
+    let mut backend = ModelBackend::new(&tree, constants(), options.seed);
     let replay = Replay {
         tree: &tree,
         path,
-        policy: &mut policy,
+        policy: &mut *policy,
         residency: Arc::new(Mutex::new(residency)),
         backend: &mut backend,
+        costs: CostModel::new(&constants().prices),
         inspector: match inspector {
             Some(inspector) => Some(inspector),
             None => None,
@@ -99,6 +100,7 @@ fn context(options: BenchOptions) -> Context {
         path_name: "walk.csv".into(),
         options,
         policy: "lakhia",
+        diagnostics: &["v_time", "share_ms"],
         clock: "model",
         constants: constants(),
         scene_fingerprint: "f".into(),
@@ -113,8 +115,10 @@ fn context(options: BenchOptions) -> Context {
 #[test]
 fn the_same_run_gives_the_same_bytes() {
     let (scene, path) = (street(20), walk(200));
-    let [first, second] =
-        [(); 2].map(|()| frames_csv(&replay(&scene, &path, options(1 << 20)), 3).unwrap());
+    let [first, second] = [(); 2].map(|()| {
+        let run = replay(&scene, &path, options(1 << 20));
+        frames_csv(&run, &context(options(1 << 20))).unwrap()
+    });
     assert!(first == second);
     assert_eq!(first.iter().filter(|&&byte| byte == b'\n').count(), 201);
 }
@@ -223,7 +227,8 @@ fn a_summary_has_the_promised_keys_and_agrees_with_the_frames() {
 fn a_run_is_written_whole_and_compares_with_itself_and_not_with_another_target() {
     let dir = tempfile::tempdir().unwrap();
     let write = |name: &str, options: BenchOptions| {
-        let (run, context) = (replay(&street(20), &walk(100), options), context(options));
+        let run = replay(&street(20), &walk(100), options.clone());
+        let context = context(options);
         let out = dir.path().join(name);
         let summary = summary(&run, &context);
         let files = write_run(&out, &run, &context, &summary).unwrap();
@@ -233,7 +238,7 @@ fn a_run_is_written_whole_and_compares_with_itself_and_not_with_another_target()
         SummaryFile::read(&out.join("summary.json")).unwrap()
     };
     let mut other = options(1 << 20);
-    let [first, second] = ["first", "second"].map(|name| write(name, other));
+    let [first, second] = ["first", "second"].map(|name| write(name, other.clone()));
     let limits = Limits { max: vec!["toggles=+0".parse().unwrap()] };
     let comparison = compare(&first, &second, &limits, false).unwrap();
     assert!(!comparison.exceeded() && comparison.differences.is_empty());
@@ -258,7 +263,7 @@ impl Policy for Overlapping {
         let child = tree.children(tree.roots()[0])[0];
         let is_visible = |node: u32| view.frustum.outside(tree.node(node).bbox) <= 0.0;
         out.front.extend(tree.roots().iter().copied().filter(|&root| is_visible(root)));
-        out.priorities.extend(tree.roots().iter().chain([&child]).map(|&node| (node, 1.0)));
+        out.requests.extend(tree.roots().iter().chain([&child]).map(|&node| (node, 1.0)));
         if self.0 > 50 && residents.contains(child) {
             out.front.extend([tree.roots()[0], child]);
             out.front.sort_unstable();
@@ -266,11 +271,9 @@ impl Policy for Overlapping {
         }
     }
 
-    fn priority(&self, _: &FrameInput<'_>, _: u32) -> f64 {
+    fn utility(&self, _: &FrameInput<'_>, _: u32) -> f64 {
         0.0
     }
-
-    fn drawn(&mut self, _: &FrameOutcome) {}
 }
 
 #[test]
@@ -284,7 +287,8 @@ fn a_front_that_is_none_ends_the_run_with_policy_frame_and_rule() {
         path: &path,
         policy: &mut Overlapping::default(),
         residency: Arc::new(Mutex::new(residency)),
-        backend: &mut ModelBackend::new(&tree, constants()),
+        backend: &mut ModelBackend::new(&tree, constants(), 0),
+        costs: CostModel::new(&constants().prices),
         inspector: None,
         options,
     };
@@ -302,7 +306,7 @@ fn a_front_that_is_none_ends_the_run_with_policy_frame_and_rule() {
 struct Onlooker(Vec<(u64, Vec<u32>, Option<Vec<u32>>)>);
 
 impl FrameInspector for Onlooker {
-    fn wants(&self, index: usize) -> bool {
+    fn wants(&self, index: usize, _: bool) -> bool {
         index.is_multiple_of(3)
     }
 

@@ -1,0 +1,262 @@
+//! Best first: all nodes as coarse as can be, then one level of one node after another, by the
+//! error that this removes from the image over what it takes, until the first that does not fit.
+//!
+//! As streamers of Gaussian splats do it: PlayCanvas's budgeted level-of-detail manager, without
+//! memory of the frame before. Babylon.js has two additions that are options here: a node that
+//! changed its level stays so for 10 frames, and leaves memory after 100 in which nobody asked for
+//! it, at 1/60 s each.
+
+use std::collections::BinaryHeap;
+
+use super::parameter::{Parameter, info, parameter, with_settings};
+use super::ranked::{Ranked, count_culled, front_ms, refining_ms, visible_children};
+use super::unused::Unused;
+use super::{PolicyKind, Settings};
+use crate::Result;
+use crate::engine::{FrameInput, Policy, Selection};
+
+const NAME: &str = "best-first";
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Options {
+    cooldown_s: f64,
+    unused_s: f64,
+}
+
+/// Neither of Babylon.js's additions.
+const OPTIONS: Options = Options { cooldown_s: 0.0, unused_s: 0.0 };
+
+const PARAMETERS: [Parameter<Options>; 2] = [
+    parameter!(
+        cooldown_s,
+        0.0,
+        60.0,
+        "seconds for which a node keeps a new level; Babylon.js: 0.167"
+    ),
+    parameter!(
+        unused_s,
+        0.0,
+        1e6,
+        "seconds after which unused nodes leave memory, 0: never; Babylon.js: 1.67"
+    ),
+];
+
+pub(super) const KIND: PolicyKind = PolicyKind {
+    name: NAME,
+    summary: "single levels by error removed over cost, until the first that does not fit",
+    source: "PlayCanvas, budgeted level of detail of splats",
+    parameters: || info(&OPTIONS, &PARAMETERS),
+    make: |settings: &Settings| -> Result<Box<dyn Policy>> {
+        let options = with_settings(NAME, OPTIONS, &PARAMETERS, settings)?;
+        Ok(Box::new(BestFirst { options, ..BestFirst::default() }))
+    },
+};
+
+#[derive(Clone, Debug, Default)]
+struct BestFirst {
+    options: Options,
+    now_s: f64,
+    /// By node: whether the last frame drew its children in its place.
+    refined: Vec<bool>,
+    /// The same in the frame at hand.
+    refines: Vec<bool>,
+    /// By node: when that changed last.
+    changed_s: Vec<f64>,
+    unused: Unused,
+    candidates: BinaryHeap<Ranked>,
+    queue: Vec<u32>,
+}
+
+/// What refining a node removes of the error of the image, over what it takes: the part of the
+/// image that it covers, times the metres of mean error that its children do not have, in pixels.
+fn rank(frame: &FrameInput<'_>, node: u32) -> f64 {
+    let &FrameInput { tree, view, .. } = frame;
+    let at = tree.node(node);
+    let children = tree.children(node).iter().map(|&child| tree.node(child).mean_error);
+    let removed = at.mean_error - children.sum::<f64>() / at.children.len().max(1) as f64;
+    let nearest = view.pose.position.clamp(at.bbox[0], at.bbox[1]);
+    let distance = view.pose.position.distance(nearest).max(tree.diagonal() * 1e-6);
+    let pixels = removed.max(0.0) * view.pixels_per_metre() / distance;
+    view.frustum.covered(at.bbox) * pixels / refining_ms(frame, node)
+}
+
+/// How useful a node is: as refining its parent is.
+fn utility(frame: &FrameInput<'_>, node: u32) -> f64 {
+    match frame.tree.node(node).parent {
+        Some(parent) => rank(frame, parent),
+        None => f64::MAX,
+    }
+}
+
+impl BestFirst {
+    /// Whether a node has just changed its level, and to what.
+    fn held(&self, node: u32) -> Option<bool> {
+        let is_fresh = self.now_s - self.changed_s[node as usize] < self.options.cooldown_s;
+        is_fresh.then_some(self.refined[node as usize])
+    }
+
+    /// A node that is drawn could be refined.
+    fn consider(&mut self, frame: &FrameInput<'_>, node: u32, out: &mut Selection) {
+        let children = frame.tree.children(node);
+        if children.is_empty() || !frame.is_visible(node) {
+            return;
+        }
+        let rank = rank(frame, node);
+        out.requests.extend(children.iter().map(|&child| (child, rank)));
+        match self.held(node) {
+            Some(false) => {}
+            Some(true) => self.candidates.push(Ranked { rank: f64::INFINITY, node }),
+            None => self.candidates.push(Ranked { rank, node }),
+        }
+    }
+
+    /// The nodes in view at which what is refined ends.
+    fn front(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
+        self.queue.clear();
+        let roots = frame.tree.roots().iter();
+        self.queue.extend(roots.filter(|&&root| frame.residents.contains(root)));
+        let mut at = 0;
+        while let Some(&node) = self.queue.get(at) {
+            at += 1;
+            if self.refines[node as usize] {
+                self.queue.extend(visible_children(frame, node));
+            } else if frame.is_visible(node) {
+                out.front.push(node);
+            }
+        }
+    }
+}
+
+impl Policy for BestFirst {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn select(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
+        out.clear();
+        let nodes = frame.tree.len();
+        self.refined.resize(nodes, false);
+        self.changed_s.resize(nodes, f64::NEG_INFINITY);
+        self.now_s += frame.dt_s;
+        self.refines.clear();
+        self.refines.resize(nodes, false);
+        self.candidates.clear();
+        self.front(frame, out);
+        let mut left_ms = frame.target_ms - front_ms(frame, &out.front);
+        out.requests.extend(frame.tree.roots().iter().map(|&root| (root, f64::MAX)));
+        for &root in &std::mem::take(&mut out.front) {
+            self.consider(frame, root, out);
+        }
+        while let Some(Ranked { rank, node }) = self.candidates.pop() {
+            if !frame.can_refine(node) {
+                continue; // its children are asked for
+            }
+            let more_ms = refining_ms(frame, node);
+            if more_ms > left_ms && rank < f64::INFINITY {
+                break;
+            }
+            left_ms -= more_ms;
+            self.refines[node as usize] = true;
+            for &child in frame.tree.children(node) {
+                self.consider(frame, child, out);
+            }
+        }
+        self.front(frame, out);
+        for (node, (before, &now)) in self.refined.iter_mut().zip(&self.refines).enumerate() {
+            if *before != now {
+                (*before, self.changed_s[node]) = (now, self.now_s);
+            }
+        }
+        count_culled(frame, out);
+        if self.options.unused_s > 0.0 {
+            self.unused.release(self.now_s, self.options.unused_s, nodes, out);
+        }
+    }
+
+    fn utility(&self, frame: &FrameInput<'_>, node: u32) -> f64 {
+        utility(frame, node)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::test_frame::TestFrame;
+    use crate::runtime::test_tree::{Sketch, sketch, tree};
+
+    /// A root at a distance, with children of 10 triangles each; refining it takes 10 ms for every
+    /// child after the first.
+    fn root(distance: f64, error: f64, children: usize) -> Sketch {
+        let at = [distance + 1.0, 0.0, 0.0];
+        let children = (0..children).map(|_| sketch(at, 1.0, vec![])).collect();
+        Sketch { error, ..sketch(at, 1.0, children) }
+    }
+
+    fn policy(settings: &[(&str, f64)]) -> Box<dyn Policy> {
+        KIND.make(&settings.iter().map(|&(name, value)| (name.into(), value)).collect()).unwrap()
+    }
+
+    #[test]
+    fn the_most_error_removed_for_its_time_comes_first_and_the_first_that_does_not_fit_ends_it() {
+        // Far: 0 → 1, 2 removes little; near: 3 → 4, 5 much; 6 → 7, 8, 9 more but takes twice.
+        let trees = vec![root(40.0, 0.1, 2), root(10.0, 0.1, 2), root(10.0, 0.15, 3)];
+        let mut frame = TestFrame::new(tree(trees));
+        for (target_ms, front) in [
+            (30.0, &[0, 3, 6][..]),
+            (40.0, &[0, 4, 5, 6]),
+            (59.0, &[0, 4, 5, 6]), // the far one would fit, but comes after
+            (60.0, &[0, 4, 5, 7, 8, 9]),
+            (70.0, &[1, 2, 4, 5, 7, 8, 9]),
+            (5.0, &[0, 3, 6]), // roots are never skipped
+        ] {
+            frame.target_ms = target_ms;
+            assert_eq!(frame.front(&mut *policy(&[])), front, "{target_ms} ms");
+        }
+    }
+
+    #[test]
+    fn what_is_not_in_memory_is_asked_for_and_passed_over() {
+        let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), root(40.0, 0.1, 2)]));
+        frame.residents.set(1, false);
+        frame.target_ms = 30.0;
+        let selection = frame.select(&mut *policy(&[]));
+        let mut front = selection.front.clone();
+        front.sort_unstable();
+        assert_eq!(front, [0, 4, 5]);
+        assert!(selection.requests.iter().any(|&(node, utility)| node == 1 && utility > 0.0));
+    }
+
+    #[test]
+    fn a_node_that_changed_its_level_keeps_it_while_it_cools_down() {
+        let fronts = |settings: &[(&str, f64)]| {
+            let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2)]));
+            frame.dt_s = 1.0 / 60.0;
+            let mut policy = policy(settings);
+            (0..30)
+                .map(|index| {
+                    frame.target_ms = if index % 2 == 0 { 30.0 } else { 5.0 };
+                    frame.front(&mut *policy).len()
+                })
+                .collect::<Vec<_>>()
+        };
+        let changes = |fronts: &[usize]| fronts.windows(2).filter(|at| at[0] != at[1]).count();
+        assert_eq!(changes(&fronts(&[])), 29);
+        assert!(changes(&fronts(&[("cooldown_s", 10.0 / 60.0)])) <= 3);
+    }
+
+    #[test]
+    fn unused_nodes_leave_memory_only_where_asked_for() {
+        let trees = || tree(vec![root(10.0, 0.1, 2)]);
+        let released = |settings: &[(&str, f64)]| {
+            let mut frame = TestFrame { dt_s: 0.1, ..TestFrame::new(trees()) };
+            let mut policy = policy(settings);
+            frame.select(&mut *policy);
+            let mut pose = frame.view.pose;
+            pose.position.x = 100.0;
+            frame.view = crate::camera::View::new(pose, frame.view.velocity, frame.view.size);
+            (0..30).flat_map(|_| frame.select(&mut *policy).released).collect::<Vec<_>>()
+        };
+        assert!(released(&[]).is_empty());
+        assert_eq!(released(&[("unused_s", 1.67)]), [1, 2]);
+    }
+}

@@ -1,0 +1,67 @@
+//! Nodes by rank, and what refining them takes.
+
+use std::cmp::Ordering;
+
+use crate::engine::{FrameInput, FrameLoad, Load, Selection, geometry_load};
+
+/// Milliseconds; nothing is free, so that gains can be divided by costs.
+const LEAST_MS: f64 = 1e-6;
+
+/// A node by rank; the lower number is first among equals.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ranked {
+    pub rank: f64,
+    pub node: u32,
+}
+
+impl Ord for Ranked {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.rank.total_cmp(&other.rank).then(other.node.cmp(&self.node))
+    }
+}
+
+impl PartialOrd for Ranked {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Ranked {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Ranked {}
+
+/// The children of a node that are in view.
+pub(super) fn visible_children<'a>(
+    frame: &'a FrameInput<'_>,
+    node: u32,
+) -> impl Iterator<Item = u32> + 'a {
+    frame.tree.children(node).iter().copied().filter(|&child| frame.is_visible(child))
+}
+
+/// Milliseconds that the children of a node in view take more than the node; more than 0.
+pub(super) fn refining_ms(frame: &FrameInput<'_>, node: u32) -> f64 {
+    let load = |node: u32| geometry_load(frame.tree.node(node));
+    let mut children = Load::default();
+    for child in visible_children(frame, node).map(load) {
+        children.draws += child.draws;
+        children.vertices += child.vertices;
+        children.triangles += child.triangles;
+    }
+    (frame.costs.added_ms(&children) - frame.costs.added_ms(&load(node))).max(LEAST_MS)
+}
+
+/// Counts what was visited outside of the view, once all requests are made.
+pub(super) fn count_culled(frame: &FrameInput<'_>, out: &mut Selection) {
+    let culled = out.requests.iter().filter(|&&(node, _)| !frame.is_visible(node));
+    out.culled = culled.count() as u32;
+}
+
+/// Milliseconds of a frame that draws a front.
+pub(super) fn front_ms(frame: &FrameInput<'_>, front: &[u32]) -> f64 {
+    let load = FrameLoad::of(frame.tree, front, frame.view).load(frame.view, 0);
+    frame.costs.estimate(&load).mean_ms
+}

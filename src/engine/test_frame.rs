@@ -1,0 +1,71 @@
+//! What policies see, for their tests.
+
+use super::{CostModel, FrameInput, Policy, Prices, Residents, Selection};
+use crate::camera::View;
+use crate::runtime::SceneTree;
+use crate::runtime::residency::MemoryUse;
+use crate::runtime::test_tree::view;
+
+/// A tree from a camera at the origin, all of it in memory, 10 ms a frame, 1 ms for each triangle.
+pub(crate) struct TestFrame {
+    pub tree: SceneTree,
+    pub view: View,
+    pub residents: Residents,
+    pub costs: CostModel,
+    pub memory: MemoryUse,
+    pub target_ms: f64,
+    pub dt_s: f64,
+}
+
+/// Only triangles take time.
+pub(crate) fn triangles_alone(ms: f64) -> Prices {
+    Prices {
+        frame: 0.0,
+        draw: 0.0,
+        vertex: 0.0,
+        triangle: ms,
+        plain_fragment: 0.0,
+        textured_fragment: 0.0,
+        uploaded_byte: 0.0,
+    }
+}
+
+impl TestFrame {
+    pub fn new(tree: SceneTree) -> Self {
+        Self {
+            residents: Residents::all(tree.len()),
+            tree,
+            view: view(),
+            costs: CostModel::new(&triangles_alone(1.0)),
+            memory: MemoryUse { cap_bytes: 1 << 30, used_bytes: 0, requested_bytes: 0 },
+            target_ms: 10.0,
+            dt_s: 1.0 / 30.0,
+        }
+    }
+
+    pub fn input(&self) -> FrameInput<'_> {
+        FrameInput {
+            tree: &self.tree,
+            view: &self.view,
+            predicted: &[],
+            residents: &self.residents,
+            memory: self.memory,
+            costs: &self.costs,
+            target_ms: self.target_ms,
+            dt_s: self.dt_s,
+        }
+    }
+
+    pub fn select(&self, policy: &mut dyn Policy) -> Selection {
+        let mut out = Selection::default();
+        policy.select(&self.input(), &mut out);
+        out
+    }
+
+    /// The front, sorted.
+    pub fn front(&self, policy: &mut dyn Policy) -> Vec<u32> {
+        let mut front = self.select(policy).front;
+        front.sort_unstable();
+        front
+    }
+}
