@@ -21,8 +21,6 @@ pub struct ClockConstants {
     /// The part of the shorter of geometry and fragments that passes while the longer does, 0 to
     /// 1: none of it where one processor does both, all of it in a pipeline of many units.
     pub overlap: f64,
-    /// The part of a hidden fragment's time that it takes although it is hidden, 0 to 1.
-    pub overdraw: f64,
     /// Milliseconds for a byte of a node in the first frame that draws it, at least 0.
     pub cold_byte: f64,
     /// Standard deviation of the logarithm of a frame's time, at least 0.
@@ -51,10 +49,10 @@ impl Default for ClockConstants {
                 triangle: 1.5e-4,
                 plain_fragment: 4e-6,
                 textured_fragment: 8e-6,
+                hidden_fragment: 2e-6,
                 uploaded_byte: 5e-7,
             },
             overlap: 0.0,
-            overdraw: 0.3,
             cold_byte: 1e-7,
             noise: 0.0,
             stalls_per_s: 0.0,
@@ -108,17 +106,14 @@ impl ClockConstants {
             ("prices.triangle", self.prices.triangle),
             ("prices.plain_fragment", self.prices.plain_fragment),
             ("prices.textured_fragment", self.prices.textured_fragment),
+            ("prices.hidden_fragment", self.prices.hidden_fragment),
             ("prices.uploaded_byte", self.prices.uploaded_byte),
             ("cold_byte", self.cold_byte),
             ("noise", self.noise),
             ("stalls_per_s", self.stalls_per_s),
             ("stall_ms", self.stall_ms),
         ];
-        let parts = [
-            ("overlap", self.overlap),
-            ("overdraw", self.overdraw),
-            ("textured_weight", self.textured_weight),
-        ];
+        let parts = [("overlap", self.overlap), ("textured_weight", self.textured_weight)];
         let loading = [("load_bytes_per_ms", self.load_bytes_per_ms)];
         let not_negative = not_negative.map(|at| (at, at.1 >= 0.0, "at least 0"));
         let parts = parts.map(|at| (at, (0.0..=1.0).contains(&at.1), "0 to 1"));

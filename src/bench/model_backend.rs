@@ -1,16 +1,16 @@
 //! A backend in which nothing is read or drawn, so that runs are the same on every machine.
 //!
 //! How long a frame takes is not what the engine's cost model says, nor any policy: there would
-//! be nothing to learn. Nodes hide what is behind them by degrees, geometry and fragments pass
-//! side by side as far as the machine has units for both, what is new is slower in its first
-//! frame, times scatter, and now and then the whole machine stalls.
+//! be nothing to learn. Geometry and fragments pass side by side as far as the machine has units for
+//! both, what is new is slower in its first frame, times scatter, and now and then the whole
+//! machine stalls.
 
 use std::sync::Mutex;
 
 use super::ClockConstants;
 use crate::camera::View;
 use crate::engine::lock;
-use crate::engine::{Backend, Drawn, geometry_load};
+use crate::engine::{Backend, Drawn, FrontLoad};
 use crate::random::Random;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::{Changes, Residency};
@@ -29,8 +29,7 @@ pub struct ModelBackend<'a> {
     dt_s: f64,
     /// Bytes that loading had time for and did not read, or the other way round below 0.
     credit: f64,
-    /// Nodes drawn, near ones first, with the part of the image under each.
-    by_distance: Vec<(f64, f64, u32)>,
+    front_load: FrontLoad,
 }
 
 impl<'a> ModelBackend<'a> {
@@ -44,45 +43,21 @@ impl<'a> ModelBackend<'a> {
             cold_bytes: 0,
             dt_s: 0.0,
             credit: 0.0,
-            by_distance: Vec::new(),
+            front_load: FrontLoad::default(),
         }
     }
 
-    /// Milliseconds of vertices, triangles and draw calls.
-    fn geometry_ms(&self, front: &[u32]) -> f64 {
+    /// Milliseconds of draw calls, vertices and triangles, and of fragments.
+    fn stages_ms(&mut self, front: &[u32], view: &View) -> [f64; 2] {
+        let load = self.front_load.of(self.tree, front, view, 0);
         let prices = &self.constants.prices;
-        let ms = |&node: &u32| {
-            let load = geometry_load(self.tree.node(node));
-            load.draws * prices.draw
-                + load.vertices * prices.vertex
-                + load.triangles * prices.triangle
-        };
-        front.iter().map(ms).sum()
-    }
-
-    /// Milliseconds of fragments: the more of the image is covered by nearer nodes, the less of a
-    /// node's are shaded.
-    fn fragment_ms(&mut self, front: &[u32], view: &View) -> f64 {
-        let eye = view.pose.position;
-        self.by_distance.clear();
-        self.by_distance.extend(front.iter().map(|&node| {
-            let bbox = self.tree.node(node).bbox;
-            (eye.distance(eye.clamp(bbox[0], bbox[1])), view.frustum.covered(bbox), node)
-        }));
-        self.by_distance.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
-        let ClockConstants { prices, overdraw, .. } = self.constants;
-        let [width, height] = view.size.map(f64::from);
-        let (mut hidden, mut ms) = (0.0, 0.0);
-        for &(_, covered, node) in &self.by_distance {
-            let shaded = covered * (1.0 - hidden);
-            hidden += shaded;
-            let node = self.tree.node(node);
-            let textured = f64::from(node.textured_triangles) / f64::from(node.triangles.max(1));
-            let price =
-                prices.textured_fragment * textured + prices.plain_fragment * (1.0 - textured);
-            ms += (shaded + overdraw * (covered - shaded)) * width * height * price;
-        }
-        ms
+        let geometry = load.draws * prices.draw
+            + load.vertices * prices.vertex
+            + load.triangles * prices.triangle;
+        let fragments = load.plain_fragments * prices.plain_fragment
+            + load.textured_fragments * prices.textured_fragment
+            + load.hidden_fragments * prices.hidden_fragment;
+        [geometry, fragments]
     }
 
     /// What a frame takes by chance: a factor, and milliseconds.
@@ -121,7 +96,7 @@ impl Backend for ModelBackend<'_> {
     }
 
     fn draw(&mut self, front: &[u32], view: &View) -> Result<Drawn> {
-        let (geometry, fragments) = (self.geometry_ms(front), self.fragment_ms(front, view));
+        let [geometry, fragments] = self.stages_ms(front, view);
         let ClockConstants { prices, overlap, cold_byte, .. } = self.constants;
         let both = geometry + fragments - overlap * geometry.min(fragments);
         let cold = cold_byte * self.cold_bytes as f64;
@@ -161,6 +136,7 @@ impl Backend for ModelBackend<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::Prices;
     use crate::engine::test_frame::triangles_alone;
     use crate::runtime::test_tree::{Sketch, sketch, tree, view};
 
@@ -177,21 +153,17 @@ mod tests {
         ClockConstants { prices, ..ClockConstants::default() }
     }
 
-    use crate::engine::Prices;
-
     #[test]
     fn what_is_hidden_takes_its_part_and_units_work_side_by_side() {
-        // The near wall fills the image; a fifth or so of it is under the far one.
-        let far = view().frustum.covered(
-            tree(vec![Sketch { size: 100.0, ..sketch([160.0, 0.0, 0.0], 1.0, vec![]) }])
-                .node(0)
-                .bbox,
-        );
-        let hidden = |overdraw, overlap| {
-            draw_ms(ClockConstants { overdraw, overlap, ..constants() }, 0, 1)[0]
+        // The near wall fills the image; all under the far one is hidden.
+        let walls = tree(vec![Sketch { size: 100.0, ..sketch([160.0, 0.0, 0.0], 1.0, vec![]) }]);
+        let far = view().frustum.covered(walls.node(0).bbox);
+        let hidden = |hidden_fragment, overlap| {
+            let prices = Prices { hidden_fragment, ..constants().prices };
+            draw_ms(ClockConstants { prices, overlap, ..constants() }, 0, 1)[0]
         };
         assert!((hidden(0.0, 0.0) - 30.0).abs() < 1e-9);
-        assert!((hidden(0.5, 0.0) - (30.0 + 5.0 * far)).abs() < 1e-9);
+        assert!((hidden(5e-4, 0.0) - (30.0 + 5.0 * far)).abs() < 1e-9);
         assert!((hidden(0.0, 1.0) - 20.0).abs() < 1e-9, "the longer of both");
     }
 

@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Number of terms.
-const TERMS: usize = 7;
+const TERMS: usize = 8;
 
 /// Seconds after which a frame counts half.
 const HALF_LIFE_S: f64 = 10.0;
@@ -33,16 +33,18 @@ pub struct Load {
     pub vertices: f64,
     /// Triangles.
     pub triangles: f64,
-    /// Fragments without a texture, those behind others included.
+    /// Fragments that are shaded without a texture.
     pub plain_fragments: f64,
-    /// Fragments with a texture.
+    /// Fragments that are shaded with a texture.
     pub textured_fragments: f64,
+    /// Fragments behind others.
+    pub hidden_fragments: f64,
     /// Bytes uploaded.
     pub uploaded_bytes: f64,
 }
 
 /// An ordinary load, by which terms are made comparable.
-const ORDINARY: [f64; TERMS] = [1.0, 100.0, 1e5, 1e5, 1e6, 1e6, 1e6];
+const ORDINARY: [f64; TERMS] = [1.0, 100.0, 1e5, 1e5, 1e6, 1e6, 1e6, 1e6];
 
 impl Load {
     /// The terms of the sum in ordinary loads; the first is what every frame has.
@@ -54,6 +56,7 @@ impl Load {
             self.triangles,
             self.plain_fragments,
             self.textured_fragments,
+            self.hidden_fragments,
             self.uploaded_bytes,
         ];
         std::array::from_fn(|at| if terms[at] > 0.0 { terms[at] / ORDINARY[at] } else { 0.0 })
@@ -75,6 +78,8 @@ pub struct Prices {
     pub plain_fragment: f64,
     /// A fragment with a texture.
     pub textured_fragment: f64,
+    /// A fragment behind others.
+    pub hidden_fragment: f64,
     /// A byte that is uploaded.
     pub uploaded_byte: f64,
 }
@@ -88,15 +93,33 @@ impl Prices {
             self.triangle,
             self.plain_fragment,
             self.textured_fragment,
+            self.hidden_fragment,
             self.uploaded_byte,
         ];
         std::array::from_fn(|at| prices[at] * ORDINARY[at])
     }
 
     fn from_ordinary(prices: [f64; TERMS]) -> Self {
-        let [frame, draw, vertex, triangle, plain_fragment, textured_fragment, uploaded_byte] =
-            std::array::from_fn(|at| prices[at] / ORDINARY[at]);
-        Self { frame, draw, vertex, triangle, plain_fragment, textured_fragment, uploaded_byte }
+        let [
+            frame,
+            draw,
+            vertex,
+            triangle,
+            plain_fragment,
+            textured_fragment,
+            hidden_fragment,
+            uploaded_byte,
+        ] = std::array::from_fn(|at| prices[at] / ORDINARY[at]);
+        Self {
+            frame,
+            draw,
+            vertex,
+            triangle,
+            plain_fragment,
+            textured_fragment,
+            hidden_fragment,
+            uploaded_byte,
+        }
     }
 }
 
@@ -232,6 +255,7 @@ mod tests {
         triangle: 1e-4,
         plain_fragment: 4e-6,
         textured_fragment: 8e-6,
+        hidden_fragment: 1e-6,
         uploaded_byte: 2e-7,
     };
 
@@ -244,6 +268,7 @@ mod tests {
             triangles,
             plain_fragments: 4e5 * random.unit(),
             textured_fragments: 1e6 * random.unit(),
+            hidden_fragments: 3e6 * random.unit(),
             uploaded_bytes: if random.unit() < 0.2 { 3e6 * random.unit() } else { 0.0 },
         }
     }

@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use super::predict::predict;
 use super::{
-    Backend, CostModel, FrameEstimate, FrameInput, FrameLoad, FrameOutcome, FrameReport,
-    FrontCheck, Inspect, Policy, PredictedView, Residents, Selection, ToggleCauses,
+    Backend, CostModel, FrameEstimate, FrameInput, FrameOutcome, FrameReport, FrontCheck,
+    FrontLoad, Inspect, Load, Policy, PredictedView, Residents, Selection, ToggleCauses,
 };
 use crate::camera::{Pose, View};
 use crate::runtime::residency::{Changes, Counters, MemoryUse, Residency};
@@ -38,6 +38,7 @@ pub struct Engine<'a> {
     residency: Arc<Mutex<Residency>>,
     backend: &'a mut dyn Backend,
     costs: CostModel,
+    front_load: FrontLoad,
     target_ms: f64,
     /// Seconds since the frame before began.
     dt_s: f64,
@@ -87,6 +88,7 @@ impl<'a> Engine<'a> {
             residency,
             backend,
             costs,
+            front_load: FrontLoad::default(),
             target_ms,
             dt_s: 0.0,
             pose: None,
@@ -163,8 +165,9 @@ impl<'a> Engine<'a> {
 
     /// Sets what was expected of a frame beside what it took, and learns from it.
     fn estimate(&mut self, view: &View, changes: &Changes, report: &mut FrameReport) {
-        let front = FrameLoad::of(self.tree, &self.selection.front, view);
-        let (drawn, whole) = (front.load(view, 0), front.load(view, changes.arrived_bytes));
+        let front = &self.selection.front;
+        let whole = self.front_load.of(self.tree, front, view, changes.arrived_bytes);
+        let drawn = Load { uploaded_bytes: 0.0, ..whole };
         let modelled = self.costs.estimate(&whole);
         (report.modelled_ms, report.modelled_deviation_ms) =
             (modelled.mean_ms, modelled.deviation_ms);

@@ -4,57 +4,58 @@ use super::Load;
 use crate::camera::View;
 use crate::runtime::{SceneTree, TreeNode};
 
-/// Sums up what the nodes of a front ask for.
+/// Sums up what fronts ask for; keeps its memory from one to the next.
 ///
-/// Fragments are those of the part of the image that the boxes cover, in all never more than the
-/// whole image: what is hidden is hardly shaded where near nodes are drawn first. They are divided
-/// into textured and plain ones as the triangles are.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FrameLoad {
-    geometry: Load,
-    /// Sums of the parts of the image under the boxes: with a texture, and without.
-    covered: [f64; 2],
+/// Fragments are those of the part of the image under each box. The more of the image is under the
+/// boxes of nearer nodes, the more of a node's fragments are hidden: near nodes are drawn first, so
+/// that these are rejected before they are shaded. Those that are shaded are textured or plain as
+/// the triangles are.
+#[derive(Clone, Debug, Default)]
+pub struct FrontLoad {
+    /// Squared distance, the part of the image under the box, and that of textured triangles.
+    by_distance: Vec<(f64, f64, f64)>,
 }
 
-impl FrameLoad {
-    /// What a front asks for.
-    pub fn of(tree: &SceneTree, front: &[u32], view: &View) -> Self {
-        let mut load = Self::default();
-        front.iter().for_each(|&node| load.add(tree.node(node), view));
-        load
-    }
-
-    /// One node more is drawn.
-    pub fn add(&mut self, node: &TreeNode, view: &View) {
-        let geometry = geometry_load(node);
-        self.geometry.draws += geometry.draws;
-        self.geometry.vertices += geometry.vertices;
-        self.geometry.triangles += geometry.triangles;
-        let covered = view.frustum.covered(node.bbox);
-        let textured = match node.triangles {
-            0 => 0.0,
-            triangles => f64::from(node.textured_triangles) / f64::from(triangles),
-        };
-        self.covered[0] += covered * textured;
-        self.covered[1] += covered * (1.0 - textured);
-    }
-
-    /// The part of the image that is covered, 0 to 1.
-    pub fn covered(&self) -> f64 {
-        self.covered.iter().sum::<f64>().min(1.0)
-    }
-
-    /// The load of a frame of a view's size that uploads so many bytes.
-    pub fn load(&self, view: &View, uploaded_bytes: u64) -> Load {
-        let [width, height] = view.size.map(f64::from);
-        let sum = self.covered.iter().sum::<f64>();
-        let pixels = width * height / sum.max(1.0);
-        Load {
-            textured_fragments: self.covered[0] * pixels,
-            plain_fragments: self.covered[1] * pixels,
-            uploaded_bytes: uploaded_bytes as f64,
-            ..self.geometry
+impl FrontLoad {
+    /// The load of a frame that draws a front and uploads so many bytes.
+    pub fn of(
+        &mut self,
+        tree: &SceneTree,
+        front: &[u32],
+        view: &View,
+        uploaded_bytes: u64,
+    ) -> Load {
+        let eye = view.pose.position;
+        let mut load = Load { uploaded_bytes: uploaded_bytes as f64, ..Load::default() };
+        self.by_distance.clear();
+        for node in front.iter().map(|&node| tree.node(node)) {
+            let geometry = geometry_load(node);
+            load.draws += geometry.draws;
+            load.vertices += geometry.vertices;
+            load.triangles += geometry.triangles;
+            let [min, max] = node.bbox;
+            let textured = match node.triangles {
+                0 => 0.0,
+                triangles => f64::from(node.textured_triangles) / f64::from(triangles),
+            };
+            let distance = eye.distance_squared(eye.clamp(min, max));
+            self.by_distance.push((distance, view.frustum.covered(node.bbox), textured));
         }
+        // Nodes in the same place hide each other alike, whatever their order.
+        self.by_distance.sort_unstable_by(|a, b| {
+            a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.total_cmp(&b.2))
+        });
+        let [width, height] = view.size.map(f64::from);
+        let pixels = width * height;
+        let mut covered = 0.0;
+        for &(_, under, textured) in &self.by_distance {
+            let shaded = under * (1.0 - covered);
+            covered += shaded;
+            load.textured_fragments += shaded * textured * pixels;
+            load.plain_fragments += shaded * (1.0 - textured) * pixels;
+            load.hidden_fragments += (under - shaded) * pixels;
+        }
+        load
     }
 }
 
@@ -74,23 +75,26 @@ mod tests {
     use crate::runtime::test_tree::{Sketch, sketch, tree, view};
 
     #[test]
-    fn fragments_are_never_more_than_the_image_and_textures_have_their_part() {
-        let ahead = || Sketch { size: 100.0, ..sketch([51.0, 0.0, 0.0], 1.0, vec![]) };
-        let tree = tree(vec![ahead(), ahead(), ahead()]);
+    fn what_is_behind_others_is_hidden_and_shaded_only_once() {
+        let ahead = |x: f64| Sketch { size: 100.0, ..sketch([x, 0.0, 0.0], 1.0, vec![]) };
+        let tree = tree(vec![ahead(251.0), ahead(51.0), ahead(151.0)]);
         let view = view();
-        let one = FrameLoad::of(&tree, &[0], &view).load(&view, 0);
-        let three = FrameLoad::of(&tree, &[0, 1, 2], &view).load(&view, 7);
-        assert_eq!((one.plain_fragments, one.textured_fragments), (10_000.0, 0.0));
-        assert!((three.plain_fragments - 10_000.0).abs() < 1e-9);
-        assert_eq!((three.triangles, three.draws, three.uploaded_bytes), (30.0, 3.0, 7.0));
+        let near = FrontLoad::default().of(&tree, &[1], &view, 0);
+        assert_eq!((near.plain_fragments, near.hidden_fragments), (10_000.0, 0.0));
+        // The others are a quarter and a sixteenth of the image, wholly behind the near one.
+        let all = FrontLoad::default().of(&tree, &[0, 1, 2], &view, 7);
+        let under = [0, 2].map(|node| view.frustum.covered(tree.node(node).bbox) * 1e4);
+        assert!((all.plain_fragments - 10_000.0).abs() < 1e-6);
+        assert!((all.hidden_fragments - under.iter().sum::<f64>()).abs() < 1e-6);
+        assert_eq!((all.triangles, all.draws, all.uploaded_bytes), (30.0, 3.0, 7.0));
+        assert_eq!(all.textured_fragments, 0.0);
     }
 
     #[test]
     fn what_is_far_covers_little() {
         // A cube of 2 m at 11 m, seen 90° high: its near face is 2 / 20 of either side.
         let tree = tree(vec![sketch([11.0, 0.0, 0.0], 1.0, vec![])]);
-        let load = FrameLoad::of(&tree, &[0], &view());
-        assert!((load.covered() - 0.01).abs() < 1e-12, "{}", load.covered());
-        assert!((load.load(&view(), 0).plain_fragments - 100.0).abs() < 1e-9);
+        let load = FrontLoad::default().of(&tree, &[0], &view(), 0);
+        assert!((load.plain_fragments - 100.0).abs() < 1e-9);
     }
 }

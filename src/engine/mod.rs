@@ -23,7 +23,7 @@ pub use backend::{Backend, Drawn, Inspect};
 pub use check_front::{FrontCheck, FrontFault, FrontRule};
 pub use cost_model::{CostModel, Estimate, Load, Prices};
 pub use engine::{Engine, lock};
-pub use frame_load::{FrameLoad, geometry_load};
+pub use frame_load::{FrontLoad, geometry_load};
 pub use policy::{FrameEstimate, FrameInput, FrameOutcome, Policy, PredictedView, Selection};
 pub use report::FrameReport;
 pub use residents::Residents;

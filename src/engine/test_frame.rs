@@ -26,6 +26,7 @@ pub(crate) fn triangles_alone(ms: f64) -> Prices {
         triangle: ms,
         plain_fragment: 0.0,
         textured_fragment: 0.0,
+        hidden_fragment: 0.0,
         uploaded_byte: 0.0,
     }
 }

@@ -5,13 +5,11 @@
 
 mod front_before;
 pub mod residency;
-mod screen_coverage;
 #[cfg(test)]
 pub(crate) mod test_tree;
 mod toggles;
 mod tree;
 
 pub use front_before::front_before;
-pub use screen_coverage::{ScreenCoverage, covered};
 pub use toggles::{ToggleCounter, Toggles};
 pub use tree::{SceneTree, TreeNode};

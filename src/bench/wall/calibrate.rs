@@ -11,7 +11,7 @@ use crate::bench::statistics::{deviation, percentile};
 use crate::bench::{CLOCK_FILE_VERSION, ClockConstants};
 use crate::camera::{CameraPath, Pose, View};
 use crate::engine::policies::{PolicyKind, Settings};
-use crate::engine::{CostModel, FrameInput, FrameLoad, Load, Prices, Residents, Selection};
+use crate::engine::{CostModel, FrameInput, FrontLoad, Load, Prices, Residents, Selection};
 use crate::loading::NodeFiles;
 use crate::render::Renderer;
 use crate::runtime::SceneTree;
@@ -68,7 +68,7 @@ impl Samples {
         let view = View::new(*pose, DVec3::ZERO, measured.renderer().options().size);
         let times = times(measured.renderer(), front, pose, near_plane(tree))?;
         let ms = percentile(&times, 50.0);
-        self.frames.push((FrameLoad::of(tree, front, &view).load(&view, 0), ms));
+        self.frames.push((FrontLoad::default().of(tree, front, &view, 0), ms));
         self.noise.push(deviation(&times) / ms);
         Ok(ms)
     }

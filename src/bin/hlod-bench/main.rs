@@ -328,7 +328,7 @@ fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Res
     print(&format!(
         "an empty frame       {:.2} ms\na draw call          {:.4} ms\n\
          1000 vertices        {:.4} ms\n1000 triangles       {:.4} ms\n\
-         1e6 plain fragments  {:.3} ms\n1e6 textured ones    {:.3} ms\n\
+         1e6 plain fragments  {:.3} ms\n1e6 textured ones    {:.3} ms\n1e6 hidden ones      {:.3} ms\n\
          noise                {:.1} %\nloading              {:.1} MB/s\n\
          c_textured           {:.3}\nwritten: {}\n",
         constants.prices.frame,
@@ -337,6 +337,7 @@ fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Res
         constants.prices.triangle * 1e3,
         constants.prices.plain_fragment * 1e6,
         constants.prices.textured_fragment * 1e6,
+        constants.prices.hidden_fragment * 1e6,
         constants.noise * 100.0,
         constants.load_bytes_per_ms / 1e3,
         constants.textured_weight,

@@ -17,6 +17,9 @@ use crate::engine::{FrameInput, Policy, Selection};
 
 const NAME: &str = "best-first";
 
+/// How often a frame is chosen anew because it was expected to be late.
+const PASSES: usize = 3;
+
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Options {
     cooldown_s: f64,
@@ -95,6 +98,15 @@ impl BestFirst {
         is_fresh.then_some(self.refined[node as usize])
     }
 
+    /// Notes which nodes changed their level in this frame.
+    fn note_changes(&mut self) {
+        for (node, (before, &now)) in self.refined.iter_mut().zip(&self.refines).enumerate() {
+            if *before != now {
+                (*before, self.changed_s[node]) = (now, self.now_s);
+            }
+        }
+    }
+
     /// A node that is drawn could be refined.
     fn consider(&mut self, frame: &FrameInput<'_>, node: u32, out: &mut Selection) {
         let children = frame.tree.children(node);
@@ -108,6 +120,35 @@ impl BestFirst {
             Some(true) => self.candidates.push(Ranked { rank: f64::INFINITY, node }),
             None => self.candidates.push(Ranked { rank, node }),
         }
+    }
+
+    /// Chooses anew, by what each step is expected to take.
+    fn refine_within(&mut self, frame: &FrameInput<'_>, budget_ms: f64, out: &mut Selection) {
+        out.clear();
+        self.refines.clear();
+        self.refines.resize(frame.tree.len(), false);
+        self.candidates.clear();
+        self.front(frame, out);
+        let mut left_ms = budget_ms - front_ms(frame, &out.front);
+        out.requests.extend(frame.tree.roots().iter().map(|&root| (root, f64::MAX)));
+        for &root in &std::mem::take(&mut out.front) {
+            self.consider(frame, root, out);
+        }
+        while let Some(Ranked { rank, node }) = self.candidates.pop() {
+            if !frame.can_refine(node) {
+                continue; // its children are asked for
+            }
+            let more_ms = refining_ms(frame, node);
+            if more_ms > left_ms && rank < f64::INFINITY {
+                break;
+            }
+            left_ms -= more_ms;
+            self.refines[node as usize] = true;
+            for &child in frame.tree.children(node) {
+                self.consider(frame, child, out);
+            }
+        }
+        self.front(frame, out);
     }
 
     /// The nodes in view at which what is refined ends.
@@ -138,34 +179,18 @@ impl Policy for BestFirst {
         self.refined.resize(nodes, false);
         self.changed_s.resize(nodes, f64::NEG_INFINITY);
         self.now_s += frame.dt_s;
-        self.refines.clear();
-        self.refines.resize(nodes, false);
-        self.candidates.clear();
-        self.front(frame, out);
-        let mut left_ms = frame.target_ms - front_ms(frame, &out.front);
-        out.requests.extend(frame.tree.roots().iter().map(|&root| (root, f64::MAX)));
-        for &root in &std::mem::take(&mut out.front) {
-            self.consider(frame, root, out);
-        }
-        while let Some(Ranked { rank, node }) = self.candidates.pop() {
-            if !frame.can_refine(node) {
-                continue; // its children are asked for
-            }
-            let more_ms = refining_ms(frame, node);
-            if more_ms > left_ms && rank < f64::INFINITY {
+        let mut budget_ms = frame.target_ms;
+        for _ in 0..PASSES {
+            self.refine_within(frame, budget_ms, out);
+            // Finer nodes also hide and cover other parts of the image, which none of them pays for.
+            let over_ms = front_ms(frame, &out.front) - frame.target_ms;
+            if over_ms <= 0.0 {
                 break;
             }
-            left_ms -= more_ms;
-            self.refines[node as usize] = true;
-            for &child in frame.tree.children(node) {
-                self.consider(frame, child, out);
-            }
+            budget_ms -= over_ms;
         }
-        self.front(frame, out);
-        for (node, (before, &now)) in self.refined.iter_mut().zip(&self.refines).enumerate() {
-            if *before != now {
-                (*before, self.changed_s[node]) = (now, self.now_s);
-            }
+        if self.options.cooldown_s > 0.0 {
+            self.note_changes();
         }
         count_culled(frame, out);
         if self.options.unused_s > 0.0 {

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use crate::engine::{FrameInput, FrameLoad, Load, Selection, geometry_load};
+use crate::engine::{FrameInput, FrontLoad, Load, Selection, geometry_load};
 
 /// Milliseconds; nothing is free, so that gains can be divided by costs.
 const LEAST_MS: f64 = 1e-6;
@@ -62,6 +62,6 @@ pub(super) fn count_culled(frame: &FrameInput<'_>, out: &mut Selection) {
 
 /// Milliseconds of a frame that draws a front.
 pub(super) fn front_ms(frame: &FrameInput<'_>, front: &[u32]) -> f64 {
-    let load = FrameLoad::of(frame.tree, front, frame.view).load(frame.view, 0);
+    let load = FrontLoad::default().of(frame.tree, front, frame.view, 0);
     frame.costs.estimate(&load).mean_ms
 }

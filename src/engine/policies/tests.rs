@@ -64,6 +64,7 @@ fn prices() -> Prices {
         triangle: 2e-4,
         plain_fragment: 1e-5,
         textured_fragment: 2e-5,
+        hidden_fragment: 5e-6,
         uploaded_byte: 1e-7,
     }
 }
@@ -151,10 +152,11 @@ fn a_still_camera_converges_and_then_toggles_nothing() {
             settings.retain(|name, _| kind.parameters().iter().any(|known| known.name == name));
             let mut policy = kind.make(&settings).unwrap();
             let mut fronts = Vec::new();
+            let mut loads = crate::engine::FrontLoad::default();
             for _ in 0..6000 {
                 let selection = frame.select(&mut *policy);
-                let load = crate::engine::FrameLoad::of(&frame.tree, &selection.front, &frame.view);
-                let ms = frame.costs.estimate(&load.load(&frame.view, 0)).mean_ms;
+                let load = loads.of(&frame.tree, &selection.front, &frame.view, 0);
+                let ms = frame.costs.estimate(&load).mean_ms;
                 policy.drawn(&FrameOutcome { actual_ms: ms, frame_ms: ms });
                 fronts.push(selection.front);
             }
