@@ -269,6 +269,40 @@ fn who_shakes_stays_within_the_amplitude_and_returns() {
 }
 
 #[test]
+fn who_turns_looks_away_and_back_from_one_frame_to_the_next() {
+    for (name, ground) in grounds() {
+        let path = make_path(&ground, PathKind::Turn, 720, 30.0, 1).unwrap();
+        let first = path.frames[0].pose;
+        let turns = path.frames.windows(2).filter(|pair| pair[0].pose != pair[1].pose).count();
+        assert_eq!(turns, 5, "{name}: every four seconds");
+        for frame in &path.frames {
+            let angle = between(first.rotation, frame.pose.rotation);
+            assert!(frame.pose.position == first.position && (angle < 1e-6 || angle > 179.999));
+        }
+        let ahead = path.frames.iter().filter(|frame| frame.pose == first).count();
+        assert_eq!(ahead, 360, "{name}");
+    }
+}
+
+#[test]
+fn who_rises_has_all_in_view_a_second_after_the_street() {
+    for (name, ground) in grounds() {
+        let fps = 30.0;
+        let path = make_path(&ground, PathKind::Rise, 1080, fps, 1).unwrap();
+        let pose = |second: f64| path.frames[(second * fps) as usize].pose;
+        let (street, sky) = (pose(0.0), pose(6.0));
+        assert!(pose(4.9) == street && pose(10.9) == sky && pose(12.0) == street, "{name}");
+        assert!(pose(5.5) != street && pose(5.5) != sky && pose(11.5) != sky, "{name}");
+        let frustum = Frustum::new(&sky, 16.0 / 9.0);
+        for corner in 0..8 {
+            let at = |axis: usize| ground.bounds[corner >> axis & 1][axis];
+            let place = ground.plan.source(DVec3::new(at(0), at(1), at(2)));
+            assert!(frustum.outside([place, place]) < 1e-6, "{name}: corner {corner}");
+        }
+    }
+}
+
+#[test]
 fn the_same_seed_gives_the_same_bytes_and_another_another_route() {
     let text = |ground: &Ground, kind, frames, seed| {
         let path = make_path(ground, kind, frames, 30.0, seed).unwrap();
