@@ -57,6 +57,26 @@ pub(crate) struct SurfacePoint {
     pub distance: f64,
 }
 
+/// A triangle has at most so many times the density of all together. One that has more lost its
+/// area, as rounding to a lattice makes it, and says nothing of how sharp the original is.
+const MOST_DENSITY: f64 = 1e4;
+
+/// Gives triangles that all but lost their area the density of all together.
+fn limit_density(triangles: &mut [SourceTriangle]) {
+    let texels: f64 = triangles.iter().map(SourceTriangle::texel_area).sum();
+    let sound = triangles.iter().filter(|triangle| triangle.density.is_finite());
+    let metres: f64 = sound
+        .filter(|triangle| triangle.density > 0.0)
+        .map(|triangle| triangle.texel_area() / triangle.density)
+        .sum();
+    let mean = if metres > 0.0 { texels / metres } else { 0.0 };
+    for triangle in triangles {
+        if !triangle.density.is_finite() || triangle.density > mean * MOST_DENSITY {
+            triangle.density = mean;
+        }
+    }
+}
+
 impl Source {
     /// The triangles of `mesh` whose material is of some class. `texels` gives the texture of a
     /// triangle, its chart, and where its corners lie in the image.
@@ -87,6 +107,7 @@ impl Source {
             });
             triangles.push(triangle);
         }
+        limit_density(&mut sources);
         let positions = mesh.positions.iter().map(|&position| wide(position)).collect();
         Self { surface: Surface::new(positions, triangles), triangles: sources }
     }
@@ -143,5 +164,39 @@ impl Source {
     /// What a triangle shows.
     pub fn triangle(&self, triangle: u32) -> &SourceTriangle {
         &self.triangles[triangle as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A triangle of half a texel.
+    fn triangle(density: f64) -> SourceTriangle {
+        SourceTriangle {
+            normal: DVec3::Z,
+            texture: 0,
+            chart: 0,
+            texels: [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+            colors: None,
+            density,
+        }
+    }
+
+    #[test]
+    fn triangles_without_area_have_the_density_of_all_together() {
+        let limited = |densities: &[f64]| {
+            let mut triangles: Vec<_> = densities.iter().map(|&at| triangle(at)).collect();
+            limit_density(&mut triangles);
+            triangles.into_iter().map(|triangle| triangle.density).collect::<Vec<f64>>()
+        };
+        assert_eq!(limited(&[100.0, 400.0, 0.0]), [100.0, 400.0, 0.0], "all sound");
+        let mean = |count: f64| count / (2.0 / 100.0);
+        for lost in [f64::INFINITY, f64::NAN, 1e300, 0.5 / f64::MIN_POSITIVE] {
+            let found = limited(&[100.0, 100.0, lost]);
+            assert_eq!(found[..2], [100.0; 2]);
+            assert!((found[2] - mean(3.0)).abs() < 1e-9, "{found:?}");
+        }
+        assert_eq!(limited(&[f64::INFINITY]), [0.0], "nothing is known");
     }
 }
