@@ -49,12 +49,13 @@ def main():
             machine(),
             conditions(arguments, rows),
             results(rows, THESIS),
-            floor(default),
+            floor(default) if arguments.clock == "wall" else "",
             sooner(rows, quick),
             "The default policy, `best-first`, along the same paths:",
             results(default, {}),
             memory(notes),
         ]
+        if part
     )
     print(text)
     if arguments.write:
