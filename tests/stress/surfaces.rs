@@ -194,7 +194,10 @@ fn odd_surfaces_are_as_good_as_sound_ones() {
 
     let fewer: Bounds = &[
         ("leaf triangles", 0.26),
-        ("triangles drawn", 0.3),
+        // All that is in view is drawn from the leaves: three quarters of the triangles a leaf, of
+        // three quarters as many leaves, since other planes cut and a path of its own sees 9
+        // of 16 rather than 12.
+        ("triangles drawn", 0.55),
         // Levels between the root's D and the leaves' N have their geometric mean: the root of 3/4.
         ("triangles, level", 0.16),
         ("nodes", 0.3),
