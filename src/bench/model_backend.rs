@@ -1,9 +1,9 @@
 //! A backend in which nothing is read or drawn, so that runs are the same on every machine.
 //!
-//! How long a frame takes is not what the engine's cost model says, nor any policy: there would
-//! be nothing to learn. Geometry and fragments pass side by side as far as the machine has units for
-//! both, what is new is slower in its first frame, times scatter, and now and then the whole
-//! machine stalls.
+//! How long a frame takes is no policy's equation. It has the terms of the engine's cost model and
+//! more: geometry and fragments pass side by side as far as the machine has units for both, what is
+//! new is slower in its first frame, times scatter, and now and then the whole machine stalls. Where
+//! all of these are 0, the cost model has nothing to learn, and its estimates prove nothing.
 
 use std::sync::Mutex;
 
