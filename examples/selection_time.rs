@@ -65,6 +65,7 @@ impl Case {
                 memory: MemoryUse::default(),
                 costs: &costs,
                 target_ms: 1e9,
+                budget_ms: 1e9,
                 dt_s: 0.02,
             };
             policy.select(&frame, selection);

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::model_load::ModelLoad;
 use crate::engine::Prices;
 use crate::{Error, Result};
 
 /// The version of the file that [`ClockConstants::write`] writes.
-pub const CLOCK_FILE_VERSION: u32 = 3;
+pub const CLOCK_FILE_VERSION: u32 = 4;
 
 /// How long things take on some machine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,6 +19,9 @@ pub struct ClockConstants {
     pub version: u32,
     /// What things take, milliseconds each; at least 0.
     pub prices: Prices,
+    /// Milliseconds for a pixel along the edge of a triangle, at least 0: machines shade in blocks,
+    /// and what of a block is outside of the triangle is wasted.
+    pub edge_fragment: f64,
     /// The part of the shorter of geometry and fragments that passes while the longer does, 0 to
     /// 1: none of it where one processor does both, all of it in a pipeline of many units.
     pub overlap: f64,
@@ -52,6 +56,7 @@ impl Default for ClockConstants {
                 hidden_fragment: 2e-6,
                 uploaded_byte: 5e-7,
             },
+            edge_fragment: 0.0,
             overlap: 0.0,
             cold_byte: 1e-7,
             noise: 0.0,
@@ -64,6 +69,25 @@ impl Default for ClockConstants {
 }
 
 impl ClockConstants {
+    /// Milliseconds to draw what a frame has, beside those of any frame.
+    pub(super) fn drawing_ms(&self, load: &ModelLoad) -> f64 {
+        let [geometry, fragments] = self.stages_ms(load);
+        geometry + fragments - self.overlap * geometry.min(fragments)
+    }
+
+    /// Milliseconds of draw calls, vertices and triangles, and of fragments.
+    pub(super) fn stages_ms(&self, load: &ModelLoad) -> [f64; 2] {
+        let prices = &self.prices;
+        let geometry = load.draws * prices.draw
+            + load.vertices * prices.vertex
+            + load.triangles * prices.triangle;
+        let fragments = load.plain_fragments * prices.plain_fragment
+            + load.textured_fragments * prices.textured_fragment
+            + load.hidden_fragments * prices.hidden_fragment
+            + load.edge_fragments * self.edge_fragment;
+        [geometry, fragments]
+    }
+
     /// Reads constants that were written earlier.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path)
@@ -108,6 +132,7 @@ impl ClockConstants {
             ("prices.textured_fragment", self.prices.textured_fragment),
             ("prices.hidden_fragment", self.prices.hidden_fragment),
             ("prices.uploaded_byte", self.prices.uploaded_byte),
+            ("edge_fragment", self.edge_fragment),
             ("cold_byte", self.cold_byte),
             ("noise", self.noise),
             ("stalls_per_s", self.stalls_per_s),

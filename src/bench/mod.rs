@@ -4,6 +4,7 @@ mod accuracy;
 mod clock;
 mod compare;
 mod model_backend;
+mod model_load;
 mod options;
 pub mod policies;
 mod record;
@@ -35,5 +36,5 @@ pub use session::Session;
 pub use summary::{Context, SUMMARY_VERSION, summary, summary_text};
 pub use sweep::Sweep;
 #[cfg(feature = "render")]
-pub use wall::{GpuBackend, Snapshots, calibrate, measure_start};
+pub use wall::{Calibration, GpuBackend, Snapshots, calibrate, measure_start};
 pub use write::{check_output, write_run};

@@ -1,16 +1,18 @@
 //! A backend in which nothing is read or drawn, so that runs are the same on every machine.
 //!
-//! How long a frame takes is no policy's equation. It has the terms of the engine's cost model and
-//! more: geometry and fragments pass side by side as far as the machine has units for both, what is
-//! new is slower in its first frame, times scatter, and now and then the whole machine stalls. Where
-//! all of these are 0, the cost model has nothing to learn, and its estimates prove nothing.
+//! How long a frame takes is nobody's own equation. Other than in the engine's cost model, fragments
+//! are hidden by what is before them in the same tile of the image, small triangles waste the
+//! blocks of pixels in which machines shade, geometry and fragments pass side by side as far as the
+//! machine has units for both, what is new is slower in its first frame, times scatter, and now and
+//! then the whole machine stalls.
 
 use std::sync::Mutex;
 
 use super::ClockConstants;
+use super::model_load::TileLoad;
 use crate::camera::View;
 use crate::engine::lock;
-use crate::engine::{Backend, Drawn, FrontLoad};
+use crate::engine::{Backend, Drawn};
 use crate::random::Random;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::{Changes, Residency};
@@ -29,7 +31,7 @@ pub struct ModelBackend<'a> {
     dt_s: f64,
     /// Bytes that loading had time for and did not read, or the other way round below 0.
     credit: f64,
-    front_load: FrontLoad,
+    load: TileLoad,
 }
 
 impl<'a> ModelBackend<'a> {
@@ -43,21 +45,8 @@ impl<'a> ModelBackend<'a> {
             cold_bytes: 0,
             dt_s: 0.0,
             credit: 0.0,
-            front_load: FrontLoad::default(),
+            load: TileLoad::default(),
         }
-    }
-
-    /// Milliseconds of draw calls, vertices and triangles, and of fragments.
-    fn stages_ms(&mut self, front: &[u32], view: &View) -> [f64; 2] {
-        let load = self.front_load.of(self.tree, front, view, 0);
-        let prices = &self.constants.prices;
-        let geometry = load.draws * prices.draw
-            + load.vertices * prices.vertex
-            + load.triangles * prices.triangle;
-        let fragments = load.plain_fragments * prices.plain_fragment
-            + load.textured_fragments * prices.textured_fragment
-            + load.hidden_fragments * prices.hidden_fragment;
-        [geometry, fragments]
     }
 
     /// What a frame takes by chance: a factor, and milliseconds.
@@ -96,9 +85,9 @@ impl Backend for ModelBackend<'_> {
     }
 
     fn draw(&mut self, front: &[u32], view: &View) -> Result<Drawn> {
-        let [geometry, fragments] = self.stages_ms(front, view);
-        let ClockConstants { prices, overlap, cold_byte, .. } = self.constants;
-        let both = geometry + fragments - overlap * geometry.min(fragments);
+        let load = self.load.of(self.tree, front, view);
+        let ClockConstants { prices, cold_byte, .. } = self.constants;
+        let both = self.constants.drawing_ms(&load);
         let cold = cold_byte * self.cold_bytes as f64;
         let (factor, stall_ms) = self.chance();
         self.frames += 1;

@@ -174,7 +174,7 @@ impl Session {
         &self,
         path: &CameraPath,
         renderer: &mut crate::render::Renderer,
-    ) -> Result<ClockConstants> {
+    ) -> Result<super::Calibration> {
         super::calibrate(renderer, &self.tree_for(&ClockConstants::default()), self.files(), path)
     }
 }

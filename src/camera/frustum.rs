@@ -62,6 +62,17 @@ impl Frustum {
     /// The part of the picture, 0 to 1, under the smallest upright rectangle around what is seen
     /// of a box.
     pub fn covered(&self, bbox: [DVec3; 2]) -> f64 {
+        self.around(bbox).map_or(0.0, |rectangle| rectangle.part())
+    }
+
+    /// That rectangle: from and to across and up the picture, which reaches from −1 to 1; `None`
+    /// where nothing of the box is seen.
+    pub fn rectangle(&self, bbox: [DVec3; 2]) -> Option<[[f64; 2]; 2]> {
+        self.around(bbox).filter(|rectangle| rectangle.part() > 0.0).map(|rectangle| rectangle.0)
+    }
+
+    #[inline(always)]
+    fn around(&self, bbox: [DVec3; 2]) -> Option<Rectangle> {
         // Of all eight corners: picture plane times depth, and depth.
         let [x, y, depth] = [self.across[0], self.across[1], self.forward].map(|direction| {
             let [in_x, in_y, in_z]: [[f64; 2]; 3] = std::array::from_fn(|axis| {
@@ -72,16 +83,16 @@ impl Frustum {
         let reach = greatest(depth).max(0.0);
         let near = reach * 1e-6; // what is nearer is seen at the picture's edge or beyond
         if reach <= 0.0 {
-            return 0.0;
+            return None;
         }
         if least(depth) < near {
-            return Rectangle::cut(std::array::from_fn(|i| [x[i], y[i], depth[i]]), near).part();
+            return Some(Rectangle::cut(std::array::from_fn(|i| [x[i], y[i], depth[i]]), near));
         }
         let ends = [x, y].map(|side| {
             let at: [f64; 8] = std::array::from_fn(|i| side[i] / depth[i]);
             [least(at).clamp(-1.0, 1.0), greatest(at).clamp(-1.0, 1.0)]
         });
-        Rectangle(ends).part()
+        Some(Rectangle(ends))
     }
 }
 

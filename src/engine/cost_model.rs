@@ -6,6 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::least_squares::{LeastSquares, dot};
+
 /// Number of terms.
 const TERMS: usize = 8;
 
@@ -20,9 +22,6 @@ const LONGEST_S: f64 = 1.0;
 
 /// How many frames of an ordinary load the prices at the start are worth.
 const PRIOR_FRAMES: f64 = 0.2;
-
-/// Sweeps of coordinate descent a frame; prices of the frame before are where they start.
-const SWEEPS: usize = 16;
 
 /// What a frame draws and uploads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -138,12 +137,7 @@ pub struct CostModel {
     /// In ordinary loads, as are the next.
     prices: [f64; TERMS],
     expected: [f64; TERMS],
-    /// Weight of what is expected.
-    prior: f64,
-    /// Sum over frames of weight × terms × terms.
-    squares: [[f64; TERMS]; TERMS],
-    /// Sum over frames of weight × terms × milliseconds.
-    products: [f64; TERMS],
+    frames: LeastSquares<TERMS>,
     /// Sums over frames of 1, of relative errors, and of their squares.
     errors: [f64; 3],
 }
@@ -153,15 +147,10 @@ impl CostModel {
     pub fn new(expected: &Prices) -> Self {
         let expected = expected.ordinary();
         let whole: f64 = expected.iter().sum();
-        Self {
-            prices: expected,
-            expected,
-            // As frames weigh in which each term is ordinary.
-            prior: if whole > 0.0 { PRIOR_FRAMES / (whole * whole) } else { PRIOR_FRAMES },
-            squares: [[0.0; TERMS]; TERMS],
-            products: [0.0; TERMS],
-            errors: [0.0; 3],
-        }
+        // As frames weigh in which each term is ordinary.
+        let prior = if whole > 0.0 { PRIOR_FRAMES / (whole * whole) } else { PRIOR_FRAMES };
+        let frames = LeastSquares::new(expected, prior);
+        Self { prices: expected, expected, frames, errors: [0.0; 3] }
     }
 
     /// What things take, as far as is known.
@@ -214,32 +203,9 @@ impl CostModel {
         self.errors = [frames + 1.0, sum + error, squares + error * error];
         // Relative errors count: a frame of 100 ms must not outweigh a hundred of 10.
         let weight = 1.0 / (actual_ms * actual_ms);
-        for (row, (squares, product)) in self.squares.iter_mut().zip(&mut self.products).enumerate()
-        {
-            for (square, term) in squares.iter_mut().zip(terms) {
-                *square = *square * kept + weight * terms[row] * term;
-            }
-            *product = *product * kept + weight * terms[row] * actual_ms;
-        }
-        self.fit();
+        self.frames.observe(&terms, actual_ms, weight, kept);
+        self.frames.fit(&mut self.prices);
     }
-
-    /// Non-negative least squares by coordinate descent.
-    fn fit(&mut self) {
-        for _ in 0..SWEEPS {
-            for at in 0..TERMS {
-                let square = self.squares[at][at] + self.prior;
-                let others =
-                    dot(&self.squares[at], &self.prices) - self.squares[at][at] * self.prices[at];
-                let product = self.products[at] + self.prior * self.expected[at];
-                self.prices[at] = ((product - others) / square).max(0.0);
-            }
-        }
-    }
-}
-
-fn dot(a: &[f64; TERMS], b: &[f64; TERMS]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use super::margin::Margin;
 use super::predict::predict;
 use super::{
     Backend, CostModel, FrameEstimate, FrameInput, FrameOutcome, FrameReport, FrontCheck,
@@ -15,38 +16,45 @@ use crate::{Error, Result};
 /// Nodes in memory whose priority is renewed in each frame though nothing visited them.
 const STALE_PER_FRAME: usize = 64;
 
-/// What the policy sees; a macro, so that the other fields stay free to be changed.
-macro_rules! frame_input {
-    ($engine:ident, $view:expr) => {
+/// What policies see, apart from the view.
+struct Seen<'a> {
+    tree: &'a SceneTree,
+    predicted: Vec<PredictedView>,
+    residents: Residents,
+    memory: MemoryUse,
+    costs: CostModel,
+    target_ms: f64,
+    budget_ms: f64,
+    /// Seconds since the frame before began.
+    dt_s: f64,
+}
+
+impl Seen<'_> {
+    fn from<'a>(&'a self, view: &'a View) -> FrameInput<'a> {
         FrameInput {
-            tree: $engine.tree,
-            view: $view,
-            predicted: &$engine.predicted,
-            residents: &$engine.residents,
-            memory: $engine.memory,
-            costs: &$engine.costs,
-            target_ms: $engine.target_ms,
-            dt_s: $engine.dt_s,
+            tree: self.tree,
+            view,
+            predicted: &self.predicted,
+            residents: &self.residents,
+            memory: self.memory,
+            costs: &self.costs,
+            target_ms: self.target_ms,
+            budget_ms: self.budget_ms,
+            dt_s: self.dt_s,
         }
-    };
+    }
 }
 
 /// Draws frame after frame of a scene.
 pub struct Engine<'a> {
-    tree: &'a SceneTree,
+    seen: Seen<'a>,
     policy: &'a mut dyn Policy,
     residency: Arc<Mutex<Residency>>,
     backend: &'a mut dyn Backend,
-    costs: CostModel,
+    margin: Margin,
     front_load: FrontLoad,
-    target_ms: f64,
-    /// Seconds since the frame before began.
-    dt_s: f64,
     /// The camera of the frame before.
     pose: Option<Pose>,
-    predicted: Vec<PredictedView>,
-    residents: Residents,
-    memory: MemoryUse,
     selection: Selection,
     /// The front of the frame before.
     before: Vec<u32>,
@@ -83,18 +91,22 @@ impl<'a> Engine<'a> {
             (residency.memory_use(), residency.counters())
         };
         Ok(Self {
-            tree,
+            seen: Seen {
+                tree,
+                predicted: Vec::new(),
+                residents: Residents::none(tree.len()),
+                memory,
+                costs,
+                target_ms,
+                budget_ms: target_ms,
+                dt_s: 0.0,
+            },
             policy,
             residency,
             backend,
-            costs,
+            margin: Margin::default(),
             front_load: FrontLoad::default(),
-            target_ms,
-            dt_s: 0.0,
             pose: None,
-            predicted: Vec::new(),
-            residents: Residents::none(tree.len()),
-            memory,
             selection: Selection::default(),
             before: Vec::new(),
             toggles: ToggleCounter::default(),
@@ -115,14 +127,15 @@ impl<'a> Engine<'a> {
 
         let changes = self.begin_frame(&mut report)?;
         report.upload_ms = self.backend.apply(&changes)?;
-        predict(self.pose.as_ref(), view, self.dt_s, &mut self.predicted);
+        let seen = &mut self.seen;
+        predict(self.pose.as_ref(), view, seen.dt_s, &mut seen.predicted);
+        seen.budget_ms = self.margin.budget_ms(seen.target_ms);
 
         let before = self.backend.now_ms();
-        let input = frame_input!(self, view);
-        self.policy.select(&input, &mut self.selection);
+        self.policy.select(&self.seen.from(view), &mut self.selection);
         report.select_ms = self.backend.now_ms() - before;
         let front = &self.selection.front;
-        self.check.check(self.tree, front, view, &self.residents).map_err(|fault| {
+        self.check.check(self.seen.tree, front, view, &self.seen.residents).map_err(|fault| {
             let (policy, frame) = (self.policy.name(), self.frames);
             Error::Internal(format!("policy {policy}, frame {frame}: {fault}"))
         })?;
@@ -141,7 +154,7 @@ impl<'a> Engine<'a> {
         self.backend.end_frame(&self.residency, report.frame_ms, interval_s * 1e3)?;
         self.count(&mut report)?;
         self.frames += 1;
-        self.dt_s = (report.frame_ms / 1e3).max(interval_s);
+        self.seen.dt_s = (report.frame_ms / 1e3).max(interval_s);
         self.pose = Some(view.pose);
         Ok(report)
     }
@@ -149,15 +162,15 @@ impl<'a> Engine<'a> {
     /// Takes over what arrived and lets go of what left.
     fn begin_frame(&mut self, report: &mut FrameReport) -> Result<Changes> {
         let mut residency = lock(&self.residency)?;
-        let changes = residency.begin_frame(self.dt_s);
+        let changes = residency.begin_frame(self.seen.dt_s);
         for &node in &changes.left {
-            self.residents.set(node, false);
+            self.seen.residents.set(node, false);
         }
         for &node in &changes.arrived {
-            self.residents.set(node, true);
+            self.seen.residents.set(node, true);
         }
-        self.residents.set_coming(residency.coming());
-        self.memory = residency.memory_use();
+        self.seen.residents.set_coming(residency.coming());
+        self.seen.memory = residency.memory_use();
         report.arrived = changes.arrived.len() as u32;
         report.uploaded_bytes = changes.arrived_bytes;
         Ok(changes)
@@ -166,18 +179,21 @@ impl<'a> Engine<'a> {
     /// Sets what was expected of a frame beside what it took, and learns from it.
     fn estimate(&mut self, view: &View, changes: &Changes, report: &mut FrameReport) {
         let front = &self.selection.front;
-        let whole = self.front_load.of(self.tree, front, view, changes.arrived_bytes);
+        let Seen { tree, costs, dt_s, .. } = &mut self.seen;
+        let whole = self.front_load.of(tree, front, view, changes.arrived_bytes);
         let drawn = Load { uploaded_bytes: 0.0, ..whole };
-        let modelled = self.costs.estimate(&whole);
+        let modelled = costs.estimate(&whole);
+        let drawn_ms = costs.estimate(&drawn).mean_ms;
         (report.modelled_ms, report.modelled_deviation_ms) =
             (modelled.mean_ms, modelled.deviation_ms);
         let estimate = self.selection.estimate.unwrap_or_else(|| FrameEstimate {
-            ms: self.costs.estimate(&drawn).mean_ms,
-            without_feedback_ms: self.costs.expected_ms(&drawn),
+            ms: drawn_ms,
+            without_feedback_ms: costs.expected_ms(&drawn),
         });
         report.estimated_ms = estimate.ms;
         report.estimated_without_feedback_ms = estimate.without_feedback_ms;
-        self.costs.observe(&whole, report.frame_ms, self.dt_s);
+        self.margin.observe(drawn_ms, report.frame_ms, *dt_s);
+        costs.observe(&whole, report.frame_ms, *dt_s);
     }
 
     /// Nodes that the last frame drew.
@@ -220,7 +236,7 @@ impl<'a> Engine<'a> {
         let mut residency = lock(&self.residency)?;
         residency.stale(STALE_PER_FRAME, &mut self.stale);
         self.others.clear();
-        let input = frame_input!(self, view);
+        let input = self.seen.from(view);
         let utility = |&node: &u32| (node, self.policy.utility(&input, node));
         self.others.extend(self.stale.iter().map(utility));
         let Selection { front, requests, released, keep_visited, .. } = &self.selection;
@@ -242,14 +258,14 @@ impl<'a> Engine<'a> {
         report.nodes_by_level = vec![0; self.levels];
         report.triangles_by_level = vec![0; self.levels];
         for &node in &selection.front {
-            let node = self.tree.node(node);
+            let node = self.seen.tree.node(node);
             report.triangles += u64::from(node.triangles);
             report.nodes_by_level[node.level as usize] += 1;
             report.triangles_by_level[node.level as usize] += u64::from(node.triangles);
         }
-        let toggles = self.toggles.count(self.tree, &selection.front);
+        let toggles = self.toggles.count(self.seen.tree, &selection.front);
         (report.toggles_up, report.toggles_down) = (toggles.up, toggles.down);
-        let frame = frame_input!(self, view);
+        let frame = self.seen.from(view);
         report.toggle_causes = ToggleCauses::of(&frame, &self.toggles, changes);
         report.finer_resident = selection.front.iter().any(|&node| frame.can_refine(node));
     }

@@ -10,6 +10,8 @@ mod cost_model;
 #[expect(clippy::module_inception)]
 mod engine;
 mod frame_load;
+pub(crate) mod least_squares;
+mod margin;
 pub mod policies;
 mod policy;
 mod predict;

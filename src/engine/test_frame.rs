@@ -53,6 +53,7 @@ impl TestFrame {
             memory: self.memory,
             costs: &self.costs,
             target_ms: self.target_ms,
+            budget_ms: self.target_ms,
             dt_s: self.dt_s,
         }
     }

@@ -225,7 +225,7 @@ fn constants_that_are_none_are_refused() {
         ("mine".into(), &["constants"]),
         ("{}".into(), &["version"]),
         (with("version", 99.into()), &["version", "99"]),
-        (with("version", 2.into()), &["version", "expected 3", "calibrate again"]),
+        (with("version", 2.into()), &["version", "expected 4", "calibrate again"]),
         (with("noise", "loud".into()), &["constants"]),
         (with("noise", (-1).into()), &["noise", "at least 0"]),
         (with("overlap", 2.into()), &["overlap", "0 to 1"]),

@@ -5,10 +5,12 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::backend::near_plane;
+use super::clock_fit::{Measured, fit_clock};
 use super::measurement_scene::MeasurementScene;
 use crate::Result;
+use crate::bench::ClockConstants;
+use crate::bench::model_load::TileLoad;
 use crate::bench::statistics::{deviation, percentile};
-use crate::bench::{CLOCK_FILE_VERSION, ClockConstants};
 use crate::camera::{CameraPath, Pose, View};
 use crate::engine::policies::{PolicyKind, Settings};
 use crate::engine::{CostModel, FrameInput, FrontLoad, Load, Prices, Residents, Selection};
@@ -28,16 +30,24 @@ const ERRORS_PIXELS: [f64; 4] = [64.0, 16.0, 4.0, 1.0];
 /// No more triangles than this are measured in a frame.
 const MOST_TRIANGLES: u64 = 400_000;
 
-/// Milliseconds to draw nodes, of several frames after one that does not count.
-fn times(renderer: &mut Renderer, front: &[u32], pose: &Pose, near: f32) -> Result<[f64; REPEATS]> {
-    renderer.draw(front, pose, near)?;
-    let mut times = [0.0; REPEATS];
-    for time in &mut times {
+/// Milliseconds to draw nodes: at first, and in several frames after that.
+fn times(
+    renderer: &mut Renderer,
+    front: &[u32],
+    pose: &Pose,
+    near: f32,
+) -> Result<(f64, [f64; REPEATS])> {
+    let mut draw = || {
         let begin = Instant::now();
         renderer.draw(front, pose, near)?;
-        *time = begin.elapsed().as_secs_f64() * 1e3;
+        Ok(begin.elapsed().as_secs_f64() * 1e3)
+    };
+    let first = draw()?;
+    let mut times = [0.0; REPEATS];
+    for time in &mut times {
+        *time = draw()?;
     }
-    Ok(times)
+    Ok((first, times))
 }
 
 /// Poses spread over a path.
@@ -52,8 +62,12 @@ fn poses(path: &CameraPath) -> impl Iterator<Item = &Pose> {
 struct Samples {
     /// What was drawn, and the median of its times.
     frames: Vec<(Load, f64)>,
+    /// The same as the model clock sees it.
+    measured: Vec<Measured>,
     /// Relative deviations of the times of the same frame.
     noise: Vec<f64>,
+    /// Milliseconds by which frames took longer when they were drawn for the first time.
+    cold_ms: f64,
 }
 
 impl Samples {
@@ -66,10 +80,12 @@ impl Samples {
     ) -> Result<f64> {
         let (tree, _) = measured.scene();
         let view = View::new(*pose, DVec3::ZERO, measured.renderer().options().size);
-        let times = times(measured.renderer(), front, pose, near_plane(tree))?;
+        let (first_ms, times) = times(measured.renderer(), front, pose, near_plane(tree))?;
         let ms = percentile(&times, 50.0);
         self.frames.push((FrontLoad::default().of(tree, front, &view, 0), ms));
+        self.measured.push((TileLoad::default().of(tree, front, &view), ms));
         self.noise.push(deviation(&times) / ms);
+        self.cold_ms += first_ms - ms;
         Ok(ms)
     }
 
@@ -138,6 +154,7 @@ fn choose(tree: &SceneTree, pose: &Pose, size: [u32; 2], pixels: f64) -> Result<
         memory: MemoryUse { cap_bytes: u64::MAX, ..MemoryUse::default() },
         costs: &CostModel::new(&ClockConstants::default().prices),
         target_ms: 1e3,
+        budget_ms: 1e3,
         dt_s: 0.0,
     };
     policy.select(&frame, &mut selection);
@@ -151,13 +168,24 @@ fn textured_weight(pairs: &[[f64; 2]]) -> Option<f64> {
     (with > 0.0 && without > 0.0).then(|| with / (with + without))
 }
 
+/// What a calibration found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Calibration {
+    /// The constants.
+    pub constants: ClockConstants,
+    /// Frames that were measured.
+    pub frames: usize,
+    /// Root of the mean square of relative errors by which these frames are off.
+    pub unexplained: f64,
+}
+
 /// Measures the constants of the model clock over fronts of a scene from places on a path.
 pub fn calibrate(
     renderer: &mut Renderer,
     tree: &SceneTree,
     files: NodeFiles,
     path: &CameraPath,
-) -> Result<ClockConstants> {
+) -> Result<Calibration> {
     let mut measured = MeasurementScene::new(tree, files, renderer);
     let size = measured.renderer().options().size;
     let (mut samples, mut stripped, mut pairs) =
@@ -180,13 +208,20 @@ pub fn calibrate(
             }
         }
     }
+    // The same triangles without textures tell what these add.
+    let without = stripped.measured.iter().map(|(load, ms)| (load.stripped(), *ms));
+    samples.measured.extend(without);
+    let (uploaded_bytes, upload_ms) = measured.uploads();
+    let by_byte = |ms: f64| ms.max(0.0) / uploaded_bytes.max(1) as f64;
     let defaults = ClockConstants::default();
-    Ok(ClockConstants {
-        version: CLOCK_FILE_VERSION,
-        prices: samples.prices(),
+    let (clock, unexplained) = fit_clock(&samples.measured, &defaults);
+    let constants = ClockConstants {
         noise: percentile(&samples.noise, 50.0),
         load_bytes_per_ms: measured.bytes_per_ms().unwrap_or(defaults.load_bytes_per_ms),
         textured_weight: textured_weight(&pairs).unwrap_or(defaults.textured_weight),
-        ..defaults
-    })
+        cold_byte: by_byte(samples.cold_ms),
+        prices: Prices { uploaded_byte: by_byte(upload_ms), ..clock.prices },
+        ..clock
+    };
+    Ok(Calibration { constants, frames: samples.measured.len(), unexplained })
 }

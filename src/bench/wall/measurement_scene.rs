@@ -6,13 +6,15 @@ use std::time::Instant;
 use crate::Result;
 use crate::loading::{Arrival, NodeFiles};
 use crate::render::Renderer;
-use crate::render::content::DrawPicture;
+use crate::render::content::{DrawPicture, held_bytes, picture_bytes};
 use crate::runtime::SceneTree;
+use crate::runtime::residency::Sizes;
 
 /// Puts on the graphics card what is to be drawn next, and takes down all of it at the end.
 pub struct MeasurementScene<'a> {
     tree: &'a SceneTree,
     files: NodeFiles,
+    sizes: Sizes,
     renderer: &'a mut Renderer,
     nodes: BTreeSet<u32>,
     /// Nodes that are there without their pictures.
@@ -22,6 +24,10 @@ pub struct MeasurementScene<'a> {
     read_bytes: u64,
     /// Milliseconds that it took to read and decode them.
     read_ms: f64,
+    /// Bytes that were copied to the card.
+    uploaded_bytes: u64,
+    /// Milliseconds that it took.
+    upload_ms: f64,
 }
 
 impl<'a> MeasurementScene<'a> {
@@ -30,6 +36,9 @@ impl<'a> MeasurementScene<'a> {
         let textures = vec![false; files.scene().shared_textures.len()];
         Self {
             tree,
+            sizes: Sizes::new(files.scene(), held_bytes, |[width, height]| {
+                picture_bytes(width, height)
+            }),
             files,
             renderer,
             nodes: BTreeSet::new(),
@@ -37,6 +46,8 @@ impl<'a> MeasurementScene<'a> {
             textures,
             read_bytes: 0,
             read_ms: 0.0,
+            uploaded_bytes: 0,
+            upload_ms: 0.0,
         }
     }
 
@@ -55,6 +66,11 @@ impl<'a> MeasurementScene<'a> {
         (self.read_bytes > 0 && self.read_ms > 0.0).then(|| self.read_bytes as f64 / self.read_ms)
     }
 
+    /// Bytes that were copied to the card so far, and milliseconds that it took.
+    pub fn uploads(&self) -> (u64, f64) {
+        (self.uploaded_bytes, self.upload_ms)
+    }
+
     /// Has exactly these nodes on the card.
     pub fn show(&mut self, front: &[u32]) -> Result<()> {
         let wanted: BTreeSet<u32> = front.iter().copied().collect();
@@ -67,7 +83,10 @@ impl<'a> MeasurementScene<'a> {
         for node in missing {
             self.add(node)?;
         }
-        self.renderer.finish_uploads()
+        let begin = Instant::now();
+        self.renderer.finish_uploads()?;
+        self.upload_ms += begin.elapsed().as_secs_f64() * 1e3;
+        Ok(())
     }
 
     /// Has exactly these nodes on the card, none with a picture.
@@ -86,7 +105,10 @@ impl<'a> MeasurementScene<'a> {
     /// Reads a node and copies it to the card.
     pub fn add(&mut self, node: u32) -> Result<()> {
         let arrival = self.read(node)?;
+        let begin = Instant::now();
         self.renderer.upload(node, self.tree.node(node).level, &arrival.content)?;
+        self.upload_ms += begin.elapsed().as_secs_f64() * 1e3;
+        self.uploaded_bytes += self.sizes.nodes[node as usize].held_bytes;
         self.nodes.insert(node);
         Ok(())
     }

@@ -2,11 +2,12 @@
 
 mod backend;
 mod calibrate;
+mod clock_fit;
 mod measurement_scene;
 mod process;
 mod snapshots;
 
 pub use backend::GpuBackend;
 pub(in crate::bench) use backend::near_plane;
-pub use calibrate::{calibrate, measure_start};
+pub use calibrate::{Calibration, calibrate, measure_start};
 pub use snapshots::Snapshots;

@@ -323,14 +323,18 @@ fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Res
     let ground = Ground::read(session.scene(), dir)?;
     let kind = PathKind::Fly;
     let path = camera::make_path(&ground, kind, kind.default_frames(), DEFAULT_FPS, 0)?;
-    let constants = session.calibrate(&path, &mut renderer)?;
+    let calibration = session.calibrate(&path, &mut renderer)?;
+    let constants = calibration.constants;
     constants.write(out)?;
     print(&format!(
         "an empty frame       {:.2} ms\na draw call          {:.4} ms\n\
          1000 vertices        {:.4} ms\n1000 triangles       {:.4} ms\n\
          1e6 plain fragments  {:.3} ms\n1e6 textured ones    {:.3} ms\n1e6 hidden ones      {:.3} ms\n\
+         1e6 edge fragments   {:.3} ms\noverlap of stages    {:.2}\n\
+         1 MB uploaded        {:.3} ms\n1 MB drawn anew      {:.3} ms\n\
          noise                {:.1} %\nloading              {:.1} MB/s\n\
-         c_textured           {:.3}\nwritten: {}\n",
+         c_textured           {:.3}\n\
+         unexplained          {:.1} % of {} frames\nwritten: {}\n",
         constants.prices.frame,
         constants.prices.draw,
         constants.prices.vertex * 1e3,
@@ -338,9 +342,15 @@ fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Res
         constants.prices.plain_fragment * 1e6,
         constants.prices.textured_fragment * 1e6,
         constants.prices.hidden_fragment * 1e6,
+        constants.edge_fragment * 1e6,
+        constants.overlap,
+        constants.prices.uploaded_byte * 1e6,
+        constants.cold_byte * 1e6,
         constants.noise * 100.0,
         constants.load_bytes_per_ms / 1e3,
         constants.textured_weight,
+        calibration.unexplained * 100.0,
+        calibration.frames,
         out.display()
     ))
 }

@@ -184,14 +184,14 @@ impl AdaptiveDisplay {
 
     /// The incremental algorithm (section 5 of the paper), from the front of the frame before.
     fn improve(&mut self, frame: &FrameInput<'_>, mut ms: f64) {
-        while ms > frame.target_ms {
+        while ms > frame.budget_ms {
             let Some(node) = self.worst_downgrade(frame) else { return };
             ms -= self.downgrade(frame, node);
         }
         while let Some(up) = self.best_upgrade() {
             let value = self.value(frame, up);
             ms += self.upgrade(frame, up);
-            while ms > frame.target_ms {
+            while ms > frame.budget_ms {
                 let Some(down) = self.worst_downgrade(frame) else { return };
                 // Of two that are worth as much, none makes way for the other.
                 if down == up || self.value(frame, down) >= value {

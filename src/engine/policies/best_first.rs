@@ -179,11 +179,11 @@ impl Policy for BestFirst {
         self.refined.resize(nodes, false);
         self.changed_s.resize(nodes, f64::NEG_INFINITY);
         self.now_s += frame.dt_s;
-        let mut budget_ms = frame.target_ms;
+        let mut budget_ms = frame.budget_ms;
         for _ in 0..PASSES {
             self.refine_within(frame, budget_ms, out);
             // Finer nodes also hide and cover other parts of the image, which none of them pays for.
-            let over_ms = front_ms(frame, &out.front) - frame.target_ms;
+            let over_ms = front_ms(frame, &out.front) - frame.budget_ms;
             if over_ms <= 0.0 {
                 break;
             }
