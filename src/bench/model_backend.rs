@@ -139,7 +139,7 @@ mod tests {
     /// 20 triangles at 1 ms, and an image of 10,000 fragments.
     fn constants() -> ClockConstants {
         let prices = Prices { plain_fragment: 1e-3, ..triangles_alone(1.0) };
-        ClockConstants { prices, ..ClockConstants::default() }
+        ClockConstants { prices, edge_fragment: 0.0, ..ClockConstants::default() }
     }
 
     #[test]
@@ -154,6 +154,15 @@ mod tests {
         assert!((hidden(0.0, 0.0) - 30.0).abs() < 1e-9);
         assert!((hidden(5e-4, 0.0) - (30.0 + 5.0 * far)).abs() < 1e-9);
         assert!((hidden(0.0, 1.0) - 20.0).abs() < 1e-9, "the longer of both");
+    }
+
+    #[test]
+    fn many_triangles_have_many_edges() {
+        let edges = draw_ms(ClockConstants { edge_fragment: 1e-3, ..constants() }, 0, 1)[0];
+        // Ten triangles over the whole image, and ten over the part of it that is far.
+        let more = edges - 30.0;
+        let near = (10.0f64 * 1e4).sqrt() * 1e-3;
+        assert!(more > near && more < 2.0 * near, "{more}");
     }
 
     #[test]

@@ -57,6 +57,7 @@ fn options(max_memory_bytes: u64) -> BenchOptions {
 fn constants() -> ClockConstants {
     ClockConstants {
         prices: Prices { frame: 0.5, ..triangles_alone(0.01) },
+        edge_fragment: 0.0,
         cold_byte: 0.0,
         load_bytes_per_ms: 50.0,
         ..ClockConstants::default()

@@ -16,7 +16,7 @@ use super::run_args::{Bytes, parse_size};
 
 /// Noise of a frame's time and stalls, where no constants are given: those of a desktop machine
 /// that does other things too.
-const NOISE: f64 = 0.03;
+const NOISE: f64 = 0.045;
 const STALLS_PER_S: f64 = 0.1;
 const STALL_MS: f64 = 15.0;
 
