@@ -183,16 +183,15 @@ impl<'a> Engine<'a> {
         let whole = self.front_load.of(tree, front, view, changes.arrived_bytes);
         let drawn = Load { uploaded_bytes: 0.0, ..whole };
         let modelled = costs.estimate(&whole);
-        let drawn_ms = costs.estimate(&drawn).mean_ms;
         (report.modelled_ms, report.modelled_deviation_ms) =
             (modelled.mean_ms, modelled.deviation_ms);
         let estimate = self.selection.estimate.unwrap_or_else(|| FrameEstimate {
-            ms: drawn_ms,
+            ms: costs.estimate(&drawn).mean_ms,
             without_feedback_ms: costs.expected_ms(&drawn),
         });
         report.estimated_ms = estimate.ms;
         report.estimated_without_feedback_ms = estimate.without_feedback_ms;
-        self.margin.observe(drawn_ms, report.frame_ms, *dt_s);
+        self.margin.observe(costs.priced_ms(&drawn), report.frame_ms, *dt_s);
         costs.observe(&whole, report.frame_ms, *dt_s);
     }
 

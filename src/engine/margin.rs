@@ -14,7 +14,7 @@ const KEPT: f64 = 0.95;
 /// However wrong estimates were, budgets stay within this of the target.
 const RANGE: [f64; 2] = [0.5, 2.0];
 
-/// Compares what frames took with what drawing them was expected to take.
+/// Compares what frames took with what their prices come to.
 ///
 /// Whatever the cost model has no term for counts: noise, choosing, uploads. Of the frames of the last
 /// ten seconds nineteen of twenty took at most `ratio` times what was expected, so that frames which

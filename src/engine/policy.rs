@@ -22,8 +22,9 @@ pub struct FrameInput<'a> {
     pub costs: &'a CostModel,
     /// Milliseconds that the frame may take.
     pub target_ms: f64,
-    /// Milliseconds that drawing it may be expected to take by the cost model, so that 19 of 20
-    /// frames keep to the target: less than it as far as frames of late took longer than expected.
+    /// Milliseconds that drawing it may take by the cost model's prices
+    /// ([`CostModel::priced_ms`]), so that 19 of 20 frames keep to the target: less than it as far
+    /// as frames of late took longer.
     pub budget_ms: f64,
     /// Seconds since the frame before began; 0 in the first.
     pub dt_s: f64,

@@ -63,5 +63,5 @@ pub(super) fn count_culled(frame: &FrameInput<'_>, out: &mut Selection) {
 /// Milliseconds of a frame that draws a front.
 pub(super) fn front_ms(frame: &FrameInput<'_>, front: &[u32]) -> f64 {
     let load = FrontLoad::default().of(frame.tree, front, frame.view, 0);
-    frame.costs.estimate(&load).mean_ms
+    frame.costs.priced_ms(&load)
 }
