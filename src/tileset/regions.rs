@@ -11,8 +11,7 @@ const PARTS: usize = 4;
 
 /// The root of a scene; its boxes enclose nothing yet but their own content.
 pub fn root(scene: &Scene) -> Tile {
-    let errors = scene.viewer_errors();
-    region(scene.roots().map(|root| Tile::of_node(scene, &errors, root)).collect())
+    region(scene.roots().map(|root| Tile::of_node(scene, root)).collect())
 }
 
 fn region(tiles: Vec<Tile>) -> Tile {
