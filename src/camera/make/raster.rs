@@ -32,16 +32,6 @@ impl Cells {
         inside.then(|| cell.y as usize * self.columns + cell.x as usize)
     }
 
-    /// The cells in a rectangle.
-    pub(super) fn within(&self, low: DVec2, high: DVec2) -> impl Iterator<Item = usize> + '_ {
-        let count = DVec2::new(self.columns as f64, self.rows as f64);
-        let cell = |place: DVec2| ((place - self.corner) / self.side).clamp(DVec2::ZERO, count);
-        let (from, to) = (cell(low).floor(), cell(high).ceil());
-        (from.y as usize..to.y as usize).flat_map(move |row| {
-            (from.x as usize..to.x as usize).map(move |column| row * self.columns + column)
-        })
-    }
-
     /// The middle of a cell.
     pub(super) fn middle(&self, cell: usize) -> DVec2 {
         let place = DVec2::new((cell % self.columns) as f64, (cell / self.columns) as f64);
@@ -69,8 +59,6 @@ pub(super) struct Surfaces {
     pub(super) low: Vec<f32>,
     /// The highest surface within each cell.
     pub(super) high: Vec<f32>,
-    /// True where a surface is over or under the middle of the cell.
-    pub(super) is_filled: Vec<bool>,
     visits_left: u64,
 }
 
@@ -81,7 +69,6 @@ impl Surfaces {
             cells,
             low: vec![f32::INFINITY; count],
             high: vec![f32::NEG_INFINITY; count],
-            is_filled: vec![false; count],
             visits_left: count as u64 * MAX_LAYERS,
         }
     }
@@ -108,10 +95,8 @@ impl Surfaces {
         ];
         if first == last {
             self.put(first[0], first[1], min.z, max.z);
-            self.is_filled[first[1] * self.cells.columns + first[0]] |= contains(triangle, first);
             return;
         }
-        let contains = |column: usize, row: usize| contains(triangle, [column, row]);
         let covered = (last[0] - first[0] + 1) as u64 * (last[1] - first[1] + 1) as u64;
         if covered > self.visits_left {
             for place in triangle {
@@ -131,7 +116,6 @@ impl Surfaces {
                 if let Some(piece) = strip.between(0, column as f32) {
                     let (low, high) = piece.range(2);
                     self.put(column, row, low, high);
-                    self.is_filled[row * self.cells.columns + column] |= contains(column, row);
                 }
             }
         }
@@ -147,15 +131,6 @@ impl Surfaces {
     pub(super) fn is_covered(&self, cell: usize) -> bool {
         self.low[cell] <= self.high[cell]
     }
-}
-
-/// Whether the middle of a cell is on a triangle or on its border, seen from above.
-fn contains(triangle: [Vec3; 3], cell: [usize; 2]) -> bool {
-    let middle = glam::Vec2::from(cell.map(|at| at as f32 + 0.5));
-    let corners = triangle.map(|corner| corner.truncate() - middle);
-    let [a, b, c] = [0, 1, 2].map(|side| corners[side].perp_dot(corners[(side + 1) % 3]));
-    // A triangle on edge contains nothing.
-    a + b + c != 0.0 && ((a >= 0.0 && b >= 0.0 && c >= 0.0) || (a <= 0.0 && b <= 0.0 && c <= 0.0))
 }
 
 /// A triangle cut by four lines has at most seven corners.
