@@ -45,39 +45,9 @@ pub fn looking_at(up: UpAxis, eye: DVec3, target: DVec3) -> Option<DQuat> {
     Some(from_angles(up, yaw.to_degrees(), libm::asin(height).to_degrees(), 0.0))
 }
 
-/// The rotation that is the part `part` of the shortest way from one to another.
-pub(crate) fn turn(from: DQuat, to: DQuat, part: f64) -> DQuat {
-    // The same rotation, on the nearer side.
-    let (to, cos) = match from.dot(to) {
-        cos if cos < 0.0 => (-to, -cos),
-        cos => (to, cos),
-    };
-    let angle = libm::acos(cos.min(1.0));
-    let sin = libm::sin(angle);
-    if sin < 1e-9 {
-        return from.lerp(to, part); // as good as the same
-    }
-    let weights = [libm::sin((1.0 - part) * angle) / sin, libm::sin(part * angle) / sin];
-    (from * weights[0] + to * weights[1]).normalize()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_part_of_a_turn_is_that_part_of_its_angle() {
-        let from = from_angles(UpAxis::Z, 10.0, 0.0, 0.0);
-        for (yaw, sign) in [(130.0, 1.0), (10.0, 1.0), (100.0, -1.0), (10.0 + 1e-9, -1.0)] {
-            let to = from_angles(UpAxis::Z, yaw, 0.0, 0.0) * sign;
-            for part in [0.0, 0.25, 0.5, 1.0] {
-                let expected = from_angles(UpAxis::Z, 10.0 + (yaw - 10.0) * part, 0.0, 0.0);
-                let found = turn(from, to, part);
-                assert!((found.dot(expected).abs() - 1.0).abs() < 1e-12, "{yaw} {part}");
-                assert!((found.length() - 1.0).abs() < 1e-12);
-            }
-        }
-    }
 
     fn near(a: DVec3, b: DVec3) -> bool {
         (a - b).length() < 1e-12

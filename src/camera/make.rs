@@ -3,13 +3,18 @@
 //! A [`Ground`] is read from the scene's coarse nodes once; [`make_path`] then makes any path on
 //! it. The same ground, kind, numbers and seed give the same path.
 
+mod aerial;
 mod circuit;
 mod fly;
 mod ground;
+mod look;
 mod orbit;
+mod panorama;
 mod plan;
 mod raster;
+mod route;
 mod search;
+mod sight;
 mod stand;
 mod streets;
 mod sudden;
@@ -18,18 +23,16 @@ mod terrain;
 #[cfg(test)]
 mod tests;
 mod travel;
-mod view_from;
 mod window;
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 use super::{CameraPath, DEFAULT_FOV_Y_DEG, PathFrame, Pose, from_angles};
 use crate::{Error, Result};
-use circuit::Circuit;
 
 pub use ground::Ground;
 pub use stand::{SHAKE_PERIOD_S, SHAKE_SWAY_M, SHAKE_TURN_DEG};
-pub use travel::MAX_TURN_DEG_S;
+pub use travel::{MAX_DRIVING_TURN_DEG_S, MAX_TURN_DEG_S};
 
 /// Frames a second where nothing else is asked for.
 pub const DEFAULT_FPS: f64 = 30.0;
@@ -80,8 +83,10 @@ impl PathKind {
 ///
 /// All have a vertical angle of view of 60°. Eyes are 1.7 m above the ground; in a scene less than
 /// 17 m wide, a tenth of its width. Speeds are in metres whatever the size of the scene; where
-/// that is too fast for its streets, and where it has none, walks and drives go around it. The
-/// whole city is in view, where it should be, in pictures at least as wide as high.
+/// that is too fast for its streets, and where it has none, walks and drives go around it; a drive
+/// takes ten seconds across a scene at least. Pictures of 16 by 9 show the model in half of
+/// their pixels, by a map of the scene, wherever that can be: cameras look aside or down for it, and
+/// are no farther above a city that they should have in view than leaves that much.
 pub fn make_path(
     ground: &Ground,
     kind: PathKind,
@@ -97,10 +102,10 @@ pub fn make_path(
         return Err(Error::Usage(format!("fps: expected {least} to {most}, found {fps}")));
     }
     let eyes = match kind {
-        PathKind::Walk => follow(ground, frames, fps, seed, WALK_M_S),
-        PathKind::Drive => follow(ground, frames, fps, seed, DRIVE_M_S),
+        PathKind::Walk => route::path(ground, frames, fps, seed, route::WALK),
+        PathKind::Drive => route::path(ground, frames, fps, seed, route::drive(ground)),
         PathKind::Fly => fly::path(ground, frames, fps, seed),
-        PathKind::Orbit => orbit::path(ground, frames),
+        PathKind::Orbit => orbit::path(ground, frames, fps),
         PathKind::Still => stand::still(ground, frames, seed),
         PathKind::Shake => stand::shake(ground, frames, fps, seed),
         PathKind::Turn => sudden::turn(ground, frames, fps, seed),
@@ -111,43 +116,38 @@ pub fn make_path(
         time_s: frame as f64 / fps,
         pose: Pose {
             position: ground.plan.source(eye.place),
-            rotation: eye.rotation,
+            rotation: from_angles(ground.plan.up(), eye.yaw_deg, eye.pitch_deg, 0.0),
             fov_y_deg: DEFAULT_FOV_Y_DEG,
         },
     };
     Ok(CameraPath { frames: eyes.into_iter().zip(0..).map(frame).collect() })
 }
 
-/// A camera on the map: its place there, but its rotation into the source's axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A camera on the map.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Eye {
     place: DVec3,
-    rotation: DQuat,
+    /// May be beyond ±180°, so that nothing jumps.
+    yaw_deg: f64,
+    pitch_deg: f64,
 }
 
 impl Eye {
-    /// Looks along a yaw and a pitch.
-    fn level(ground: &Ground, place: DVec3, yaw_deg: f64, pitch_deg: f64) -> Self {
-        Self { place, rotation: from_angles(ground.plan.up(), yaw_deg, pitch_deg, 0.0) }
-    }
-
     /// Looks at another place.
-    fn towards(ground: &Ground, place: DVec3, target: DVec3) -> Self {
+    fn towards(place: DVec3, target: DVec3) -> Self {
         let ahead = target - place;
         let pitch = libm::atan2(ahead.z, ahead.truncate().length()).to_degrees();
-        Self::level(ground, place, plan::yaw_deg(ahead.truncate()), pitch)
+        Self { place, yaw_deg: plan::yaw_deg(ahead.truncate()), pitch_deg: pitch }
     }
-}
 
-/// Along the streets at `speed` metres a second, looking ahead.
-fn follow(ground: &Ground, frames: usize, fps: f64, seed: u64, speed: f64) -> Vec<Eye> {
-    // The same route at any speed, wherever the streets are long enough for it.
-    let route = Circuit::make(ground, seed, DRIVE_M_S / fps);
-    let places = route.march(frames + travel::ahead(fps), |_| speed / fps);
-    let places = places.unwrap_or_default();
-    let yaws = travel::yaws(&places, fps);
-    let eye = |(&place, &yaw): (&DVec3, &f64)| Eye::level(ground, place, yaw, 0.0);
-    places.iter().zip(&yaws).take(frames).map(eye).collect()
+    /// On the straight way to another, turning the shorter way.
+    fn between(&self, other: &Self, part: f64) -> Self {
+        Self {
+            place: self.place.lerp(other.place, part),
+            yaw_deg: self.yaw_deg + travel::turn(self.yaw_deg, other.yaw_deg) * part,
+            pitch_deg: self.pitch_deg + (other.pitch_deg - self.pitch_deg) * part,
+        }
+    }
 }
 
 /// From 0 to 1 without a jolt at either end, and 0 or 1 beyond.

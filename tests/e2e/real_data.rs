@@ -1,32 +1,18 @@
 //! The real data sets, where they are present: `HLOD_DATA`, or `../shared/data` beside the
 //! repository.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use glam::DVec3;
 use hlod::builder::BuildOptions;
 use hlod::verify::{Silent, VerifyOptions, verify};
 use hlod::{Error, import};
 
-use crate::support::build_with;
 use crate::support::geometry::area;
 use crate::support::result::{Built, report};
+use crate::support::{build_with, data};
 
 const DESIRED_TRIS: u64 = 2000;
-
-/// The data, or `None`, said once a set.
-fn data(set: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("HLOD_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-        PathBuf::from,
-    );
-    let path = folder.join(set);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("skipped: {} is not there", path.display());
-    None
-}
 
 /// The area of a model as imported.
 fn source_area(inputs: &[PathBuf]) -> f64 {

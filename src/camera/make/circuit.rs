@@ -5,18 +5,17 @@ use glam::{DVec2, DVec3};
 use super::ground::Ground;
 use super::plan;
 use super::plan::yaw_deg;
-use super::search::Prices;
 use super::streets::Streets;
 use crate::random::Random;
 
+/// The first of the random streams of routes; 1 is that of places to stand at.
+const STREAMS: u64 = 2;
 /// Places that a route goes by.
 const STOPS: usize = 6;
 /// Places drawn for each of them, of which the best is taken.
 const DRAWN: usize = 48;
 /// Corners are rounded as by a Gaussian of this many metres.
 const ROUNDING_M: f64 = 3.0;
-/// Another street is taken rather than the same again within this many metres.
-const BESIDE_M: f64 = 3.0;
 /// Steps to a round where a route is made around a scene.
 const ROUND_STEPS: f64 = 16.0;
 /// Corners of such a route.
@@ -29,24 +28,28 @@ pub(super) struct Circuit {
 }
 
 impl Circuit {
-    /// A route for steps of at most `step` metres: along streets where there are any, else around.
-    pub(super) fn make(ground: &Ground, seed: u64, step: f64) -> Self {
-        Streets::find(ground)
-            .and_then(|streets| Self::along(&streets, seed))
+    /// A route for steps of at most `step` metres, another one with each seed and each `attempt`:
+    /// along streets where there are any, else around.
+    pub(super) fn make(
+        ground: &Ground,
+        streets: Option<&Streets<'_>>,
+        seed: u64,
+        attempt: u64,
+        step: f64,
+    ) -> Self {
+        streets
+            .and_then(|streets| Self::along(streets, &mut Random::new(seed, STREAMS + attempt)))
             .filter(|circuit| circuit.march(1, |_| step * 2.0).is_some())
             .unwrap_or_else(|| Self::around(ground, step))
     }
 
     /// By way of places that are far apart and have much to see.
-    fn along(streets: &Streets<'_>, seed: u64) -> Option<Self> {
-        let (ground, cells) = (streets.ground, &streets.ground.cells);
-        let stops = stops(streets, &mut Random::new(seed, 0));
-        let mut prices = Prices::new(streets);
-        let beside = (BESIDE_M * ground.scale / cells.side) as usize;
+    fn along(streets: &Streets<'_>, random: &mut Random) -> Option<Self> {
+        let (ground, cells) = (streets.ground, &streets.ground.surfaces.cells);
+        let stops = stops(streets, random);
         let mut way = Vec::new();
         for (index, &stop) in stops.iter().enumerate() {
-            let leg = prices.way(streets, stop, stops[(index + 1) % stops.len()])?;
-            prices.mark(streets, &leg, beside);
+            let leg = streets.way(stop, stops[(index + 1) % stops.len()])?;
             // The last cell is the first of the next leg.
             way.extend_from_slice(&leg[..leg.len() - 1]);
         }
@@ -81,7 +84,7 @@ impl Circuit {
 
     /// A circle outside of what is mapped.
     pub(super) fn around(ground: &Ground, step: f64) -> Self {
-        let cells = &ground.cells;
+        let cells = &ground.surfaces.cells;
         let half = DVec2::new(cells.columns as f64, cells.rows as f64) * cells.side / 2.0;
         let centre = cells.corner + half;
         let radius = half.length().max(step * ROUND_STEPS / std::f64::consts::TAU);
@@ -126,7 +129,7 @@ impl Circuit {
 
 /// Places worth going by, far from each other, in the order of a round.
 fn stops(streets: &Streets<'_>, random: &mut Random) -> Vec<usize> {
-    let cells = &streets.ground.cells;
+    let cells = &streets.ground.surfaces.cells;
     let mut stops: Vec<usize> = Vec::new();
     for _ in 0..STOPS {
         let apart = |cell: usize| {

@@ -4,8 +4,10 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 
+use super::panorama::Panorama;
 use super::plan::Plan;
 use super::raster::{Cells, Surfaces};
+use super::sight::Sight;
 use super::{survey, terrain, window};
 use crate::format::Scene;
 use crate::{Error, Result};
@@ -26,8 +28,14 @@ const STEP_OVER_M: f64 = 0.85;
 const STEEPEST: f64 = 0.7;
 /// Slabs thicker than this are buildings, metres.
 const MAX_SLAB_M: f64 = 2.5;
-/// Half the side of the square in which buildings make a place built-up, metres.
-const NEIGHBOURHOOD_M: f64 = 30.0;
+/// Half the sides of the squares in which the place with most of the model is sought: a few metres,
+/// and a part of the city's width.
+const NEAR_M: f64 = 10.0;
+const NEAR_PART: f64 = 0.125;
+/// What is farther away than this is not in a flight's way, metres.
+const CLEAR_M: f64 = 20.0;
+/// Longest side, in cells, of the coarse map of a city of which only a part is mapped finely.
+const OVERVIEW_CELLS: f64 = 1024.0;
 
 /// The ground of a scene, its obstacles and the room between them, for [`make_path`].
 ///
@@ -42,17 +50,20 @@ pub struct Ground {
     pub(super) scale: f64,
     /// Around all nodes, on the map.
     pub(super) bounds: [DVec3; 2],
-    /// True where the map shows all of the scene.
-    pub(super) is_whole: bool,
-    pub(super) cells: Cells,
+    /// Of the mapped part.
+    pub(super) surfaces: Surfaces,
+    /// Of all of the city, coarsely; `None` where all is mapped.
+    pub(super) overview: Option<Surfaces>,
+    /// The middle of where most of the model is.
+    pub(super) focus: DVec3,
+    /// How much of the model is near each cell of the fine map, and farther around.
+    density: Vec<f32>,
     /// Height of the ground.
     pub(super) height: Vec<f32>,
-    /// The highest surface, or −∞.
-    pub(super) high: Vec<f32>,
     /// Metres to the middle of the nearest obstacle; 0 within one.
     pub(super) clearance: Vec<f32>,
-    /// How much of the neighbourhood is built up, 0 to 1.
-    pub(super) built: Vec<f32>,
+    /// How much one sees.
+    pub(super) sight: Sight,
 }
 
 impl Ground {
@@ -75,8 +86,17 @@ impl Ground {
         let nodes = survey::nodes(scene, &plan, shown, cells.side / 2.0);
         let mut surfaces = Surfaces::new(cells);
         survey::read(scene, dir, &nodes, &plan, &mut surfaces)?;
-        let is_whole = shown == bounds.map(DVec3::truncate);
-        Ok(Self::new(plan, scale, bounds, is_whole, surfaces))
+        let whole = bounds.map(DVec3::truncate);
+        let mut overview = None;
+        if shown != whole {
+            let side = (whole[1] - whole[0]).max_element() / OVERVIEW_CELLS;
+            let cells = cells_of(whole, side);
+            let nodes = survey::nodes(scene, &plan, whole, side);
+            let mut surfaces = Surfaces::new(cells);
+            survey::read(scene, dir, &nodes, &plan, &mut surfaces)?;
+            overview = Some(surfaces);
+        }
+        Ok(Self::new(plan, scale, bounds, surfaces, overview))
     }
 
     /// The ground under surfaces that were rasterised.
@@ -84,8 +104,8 @@ impl Ground {
         plan: Plan,
         scale: f64,
         bounds: [DVec3; 2],
-        is_whole: bool,
         surfaces: Surfaces,
+        overview: Option<Surfaces>,
     ) -> Self {
         let bottom = if is_slabs(&surfaces, scale) { &surfaces.high } else { &surfaces.low };
         let is_covered = |cell| surfaces.is_covered(cell);
@@ -94,9 +114,45 @@ impl Ground {
         let blocked: Vec<bool> =
             surfaces.high.iter().zip(&height).map(|(high, ground)| high - ground > step).collect();
         let clearance = clearance(&surfaces.cells, &blocked);
-        let built = built(&surfaces.cells, &blocked, NEIGHBOURHOOD_M * scale);
-        let Surfaces { cells, high, .. } = surfaces;
-        Self { plan, scale, bounds, is_whole, cells, height, high, clearance, built }
+        let eye = |cell: usize| f64::from(height[cell]) + EYE_HEIGHT_M * scale;
+        let sight = Sight::new(&surfaces, scale, |cell| clearance[cell] > 0.0, eye);
+        let density = density(&surfaces, scale);
+        let focus = match &overview {
+            Some(overview) => densest(overview, &self::density(overview, scale), |_| true),
+            None => densest(&surfaces, &density, |_| true),
+        };
+        let focus = focus.unwrap_or_default();
+        Self { plan, scale, bounds, surfaces, overview, focus, density, height, clearance, sight }
+    }
+
+    /// What is seen around a place.
+    pub(super) fn panorama(&self, eye: DVec3) -> Panorama {
+        let near = Panorama::new(&self.surfaces, eye);
+        match &self.overview {
+            Some(overview) => near.or(&Panorama::beyond(&self.surfaces.cells, overview, eye)),
+            None => near,
+        }
+    }
+
+    /// Where most of the model is within so many metres of a place of the fine map; the place itself
+    /// where there is nothing.
+    pub(super) fn focus_near(&self, place: DVec3, reach: f64) -> DVec3 {
+        let is_near = |other: DVec2| other.distance(place.truncate()) <= reach;
+        densest(&self.surfaces, &self.density, is_near).unwrap_or(place)
+    }
+
+    /// The lowest height at a place that is clear of all that stands near it: it falls by a metre for
+    /// each metre away from that.
+    pub(super) fn clear_height(&self, place: DVec2) -> f64 {
+        let reach = DVec2::splat(CLEAR_M * self.scale);
+        let height = |map: &Surfaces| {
+            let away = |cell: usize| (map.cells.middle(cell) - place).length() - map.cells.side;
+            let height = |cell: usize| f64::from(map.high[cell]) - away(cell).max(0.0);
+            let cells = map.cells.within(place - reach, place + reach);
+            cells.map(height).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let coarse = self.overview.as_ref().map_or(f64::NEG_INFINITY, height);
+        height(&self.surfaces).max(coarse) + self.eye_height()
     }
 
     /// Metres from the ground to the eye.
@@ -106,23 +162,40 @@ impl Ground {
 
     /// The height of the ground at a place; that of the nearest cell outside of the map.
     pub(super) fn height_at(&self, place: DVec2) -> f64 {
-        let limit = DVec2::new(self.cells.columns as f64, self.cells.rows as f64) - 0.5;
-        let near = ((place - self.cells.corner) / self.cells.side).clamp(DVec2::splat(0.5), limit);
-        let cell = self.cells.at(self.cells.corner + near * self.cells.side).unwrap_or(0);
+        let cells = &self.surfaces.cells;
+        let limit = DVec2::new(cells.columns as f64, cells.rows as f64) - 0.5;
+        let near = ((place - cells.corner) / cells.side).clamp(DVec2::splat(0.5), limit);
+        let cell = cells.at(cells.corner + near * cells.side).unwrap_or(0);
         f64::from(self.height[cell])
     }
 
-    /// True where the scene has any surface over a cell.
-    pub(super) fn is_covered(&self, cell: usize) -> bool {
-        self.high[cell] > f32::NEG_INFINITY
+    /// The middle of the scene.
+    pub(super) fn middle(&self) -> DVec3 {
+        (self.bounds[0] + self.bounds[1]) / 2.0
     }
+}
 
-    /// The middle of the scene, and the radius of the sphere around it that holds all of it.
-    pub(super) fn sphere(&self) -> (DVec3, f64) {
-        let [min, max] = self.bounds;
-        let radius = (max - min).length() / 2.0;
-        ((min + max) / 2.0, if radius > 0.0 { radius } else { 1.0 })
-    }
+/// The product of the shares of cells with a surface in a small and in a wide square around each.
+fn density(surfaces: &Surfaces, scale: f64) -> Vec<f32> {
+    let cells = &surfaces.cells;
+    let is_covered: Vec<bool> = (0..cells.len()).map(|cell| surfaces.is_covered(cell)).collect();
+    let width = cells.side * cells.columns.max(cells.rows) as f64;
+    let [near, wide] =
+        [NEAR_M * scale, width * NEAR_PART].map(|reach| share(cells, &is_covered, reach));
+    near.iter().zip(&wide).map(|(near, wide)| near * wide).collect()
+}
+
+/// The first of the densest cells with a surface that are in question, at its height.
+fn densest(
+    surfaces: &Surfaces,
+    density: &[f32],
+    is_in_question: impl Fn(DVec2) -> bool,
+) -> Option<DVec3> {
+    let cells = &surfaces.cells;
+    (0..cells.len())
+        .filter(|&cell| surfaces.is_covered(cell) && is_in_question(cells.middle(cell)))
+        .reduce(|a, b| if density[b] > density[a] { b } else { a })
+        .map(|cell| cells.middle(cell).extend(surfaces.high[cell].into()))
 }
 
 /// True where a scene is of slabs that one goes on, as roads are that someone made solid: most of
@@ -145,8 +218,12 @@ pub(super) fn cells([min, max]: [DVec2; 2], scale: f64) -> Cells {
     let margin = MARGIN_M * scale;
     let extent = max - min + 2.0 * margin;
     let side = (CELL_M * scale).max(extent.max_element() / MAX_CELLS);
-    let count = (extent / side).ceil().max(DVec2::ONE);
-    Cells { corner: min - margin, side, columns: count.x as usize, rows: count.y as usize }
+    cells_of([min - margin, max + margin], side)
+}
+
+fn cells_of([min, max]: [DVec2; 2], side: f64) -> Cells {
+    let count = ((max - min) / side).ceil().max(DVec2::ONE);
+    Cells { corner: min, side, columns: count.x as usize, rows: count.y as usize }
 }
 
 /// A person's size in a scene of `size` metres.
@@ -157,7 +234,7 @@ pub(super) fn scale(size: DVec3) -> f64 {
 
 /// Metres from each cell's middle to the nearest obstacle's: chamfer distances in two sweeps, at
 /// most 8 % too long (Borgefors 1986).
-fn clearance(cells: &Cells, blocked: &[bool]) -> Vec<f32> {
+pub(super) fn clearance(cells: &Cells, blocked: &[bool]) -> Vec<f32> {
     let side = cells.side as f32;
     let mut distance: Vec<f32> =
         blocked.iter().map(|&is| if is { 0.0 } else { f32::INFINITY }).collect();
@@ -174,8 +251,8 @@ fn clearance(cells: &Cells, blocked: &[bool]) -> Vec<f32> {
     distance
 }
 
-/// The share of obstacles in the square within `reach` metres of each cell.
-fn built(cells: &Cells, blocked: &[bool], reach: f64) -> Vec<f32> {
+/// The share of cells that are so in the square within `reach` metres of each.
+fn share(cells: &Cells, is_so: &[bool], reach: f64) -> Vec<f32> {
     let reach = (reach / cells.side).ceil() as usize;
     // sums[row][column] counts what is before both: a row and a column more than there are cells.
     let width = cells.columns + 1;
@@ -183,7 +260,7 @@ fn built(cells: &Cells, blocked: &[bool], reach: f64) -> Vec<f32> {
     for row in 0..cells.rows {
         let mut line = 0;
         for column in 0..cells.columns {
-            line += u32::from(blocked[row * cells.columns + column]);
+            line += u32::from(is_so[row * cells.columns + column]);
             sums[(row + 1) * width + column + 1] = sums[row * width + column + 1] + line;
         }
     }
@@ -205,11 +282,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn clearance_and_built_up_share_are_those_of_a_slow_count() {
+    fn clearance_and_shares_are_those_of_a_slow_count() {
         let cells = Cells { corner: DVec2::ZERO, side: 2.0, columns: 17, rows: 11 };
         let blocked: Vec<bool> = (0..cells.len()).map(|cell| cell * 7919 % 37 == 3).collect();
         let clearance = clearance(&cells, &blocked);
-        let built = built(&cells, &blocked, 6.0);
+        let shares = share(&cells, &blocked, 6.0);
         for cell in 0..cells.len() {
             let place = cells.middle(cell);
             let others = (0..cells.len()).filter(|&other| blocked[other]);
@@ -221,7 +298,7 @@ mod tests {
             let near = |other: &usize| (cells.middle(*other) - place).abs().max_element() <= 6.0;
             let square: Vec<usize> = (0..cells.len()).filter(near).collect();
             let count = square.iter().filter(|&&other| blocked[other]).count();
-            assert_eq!(built[cell], count as f32 / square.len() as f32);
+            assert_eq!(shares[cell], count as f32 / square.len() as f32);
         }
     }
 
@@ -239,8 +316,8 @@ mod tests {
             }
             let plan = Plan::new(crate::mesh::UpAxis::Z, DVec3::ZERO);
             let bounds = [DVec3::ZERO, DVec3::new(100.0, 40.0, thick)];
-            let ground = Ground::new(plan, 1.0, bounds, true, surfaces);
-            let cell = ground.cells.at(DVec2::new(50.0, 20.0)).unwrap();
+            let ground = Ground::new(plan, 1.0, bounds, surfaces, None);
+            let cell = ground.surfaces.cells.at(DVec2::new(50.0, 20.0)).unwrap();
             assert_eq!(ground.clearance[cell] > 0.0, is_road, "{thick}");
             let expected = if is_road { thick } else { 0.0 };
             assert!((f64::from(ground.height[cell]) - expected).abs() < 0.2, "{thick}");

@@ -1,14 +1,14 @@
 //! Cossutti's path (2014, section 5.1 and figure 5.1): it "circles around the model and then moves
 //! through the centre of the model and back". As in his figure 5.4 the circle takes half of the
-//! frames, and each pass leads past the edge of the model, so that nothing is in view before the
-//! camera turns round.
+//! frames. His passes lead past the edge of the model, where nothing is in view; ours turn round
+//! while there is something.
 
 use glam::DVec2;
 
-use super::fly::WHOLE_IN_VIEW;
 use super::ground::Ground;
-use super::{Eye, plan, smooth};
-use crate::camera::angles::turn;
+use super::look::{ENOUGH, Search};
+use super::panorama::Picture;
+use super::{Eye, aerial, plan, smooth};
 
 /// The part of the frames that goes around.
 pub(super) const CIRCLE_PART: f64 = 0.5;
@@ -16,71 +16,76 @@ pub(super) const CIRCLE_PART: f64 = 0.5;
 const DESCENT_PART: f64 = 0.05;
 /// The part that turns round between the passes; the passes share what is left.
 const TURN_PART: f64 = 0.05;
-/// Height of the circle, in degrees above the horizon of the model's middle.
-const ELEVATION_DEG: f64 = 30.0;
-/// Where a pass begins and ends, in half widths of the model from its middle.
-const BEYOND: f64 = 1.2;
+/// Parts of the way from the middle to the edge at which a pass may turn round.
+const TURNS: u32 = 24;
+/// Degrees by which who passes may look down.
+const DOWN_DEG: [f64; 4] = [0.0, 20.0, 40.0, 60.0];
 /// Directions in which a pass may lead.
 const DIRECTIONS: u32 = 72;
 /// Room to both sides of a pass, metres.
 const ROOM_M: f64 = 2.0;
 
-pub(super) fn path(ground: &Ground, frames: usize) -> Vec<Eye> {
-    let (centre, radius) = ground.sphere();
+pub(super) fn path(ground: &Ground, frames: usize, fps: f64) -> Vec<Eye> {
     let (yaw, height) = corridor(ground);
-    let ahead = plan::direction(yaw);
-    let half = (ground.bounds[1] - ground.bounds[0]).truncate().length() / 2.0;
-    let middle = centre.truncate();
-    let reach = half * BEYOND + 2.0 * ground.eye_height();
-    let at = |along: f64| (middle + ahead * along).extend(height);
-    let (sin, cos) = libm::sincos(ELEVATION_DEG.to_radians());
-    let (circle_height, circle_radius) =
-        (radius * WHOLE_IN_VIEW * sin, radius * WHOLE_IN_VIEW * cos);
-    let circle = |part: f64| {
-        let from = plan::direction(360.0 * part).rotate(-ahead);
-        centre + (from * circle_radius).extend(circle_height)
+    let at = |along: f64| {
+        let place = ground.focus.truncate() + plan::direction(yaw) * along;
+        Eye { place: place.extend(height), yaw_deg: yaw, pitch_deg: 0.0 }
     };
-    let end = Eye::towards(ground, circle(1.0), centre);
+    let reach = reach(ground, at);
+    let circle = aerial::around(ground, ground.focus, |elevation, part| {
+        aerial::circle(yaw + 180.0, elevation, part)
+    });
     let pass = (1.0 - CIRCLE_PART - DESCENT_PART - TURN_PART) / 2.0;
     let eye = |part: f64| {
         let mut left = part;
         if left <= CIRCLE_PART {
-            return Eye::towards(ground, circle(left / CIRCLE_PART), centre);
+            return circle(left / CIRCLE_PART);
         }
         left -= CIRCLE_PART;
         if left <= DESCENT_PART {
-            let part = smooth(left / DESCENT_PART);
-            let begin = Eye::level(ground, at(-reach), yaw, 0.0);
-            return Eye {
-                place: end.place.lerp(begin.place, part),
-                rotation: turn(end.rotation, begin.rotation, part),
-            };
+            return circle(1.0).between(&at(-reach), smooth(left / DESCENT_PART));
         }
         left -= DESCENT_PART;
         if left <= pass {
-            return Eye::level(ground, at(reach * (2.0 * left / pass - 1.0)), yaw, 0.0);
+            return at(reach * (2.0 * left / pass - 1.0));
         }
         left -= pass;
-        if left <= TURN_PART {
-            return Eye::level(ground, at(reach), yaw + 180.0 * smooth(left / TURN_PART), 0.0);
-        }
-        left -= TURN_PART;
-        Eye::level(ground, at(reach * (1.0 - 2.0 * (left / pass).min(1.0))), yaw + 180.0, 0.0)
+        let turned = smooth(left / TURN_PART);
+        let along = reach * (1.0 - 2.0 * ((left - TURN_PART).max(0.0) / pass).min(1.0));
+        Eye { yaw_deg: yaw + 180.0 * turned, ..at(along) }
     };
-    (0..frames).map(|index| eye(index as f64 / (frames.max(2) - 1) as f64)).collect()
+    let wished: Vec<Eye> =
+        (0..frames).map(|index| eye(index as f64 / (frames.max(2) - 1) as f64)).collect();
+    Search::flight(fps).look(ground, &wished)
 }
 
-/// The direction through the middle in which one can pass lowest, and the height of the eye there:
-/// down a street where one leads through the middle, else over the roofs.
+/// How far from where most of the model is one can go, to both sides, and have enough in view all
+/// along.
+fn reach(ground: &Ground, at: impl Fn(f64) -> Eye) -> f64 {
+    let half = (ground.bounds[1] - ground.bounds[0]).truncate().length() / 2.0;
+    let is_enough = |along: f64| {
+        let eye = at(along);
+        let panorama = ground.panorama(eye.place);
+        let pictures = DOWN_DEG.map(|down| Picture::new(-down));
+        [0.0, 180.0].into_iter().all(|back| {
+            pictures.iter().any(|picture| panorama.part(picture, eye.yaw_deg + back) >= ENOUGH)
+        })
+    };
+    let reaches = (1..=TURNS).map(|part| half * f64::from(part) / f64::from(TURNS));
+    let enough = reaches.take_while(|&reach| is_enough(-reach) && is_enough(reach));
+    enough.last().unwrap_or(half / f64::from(TURNS))
+}
+
+/// The direction through where most of the model is in which one can pass lowest, and the height of
+/// the eye there: down a street where one leads through, else over the roofs.
 fn corridor(ground: &Ground) -> (f64, f64) {
     let eye = ground.eye_height();
-    if !ground.is_whole {
+    if ground.overview.is_some() {
         // What stands outside of the map is not known.
         return (0.0, ground.bounds[1].z + eye);
     }
-    let (centre, _) = ground.sphere();
     let half = (ground.bounds[1] - ground.bounds[0]).truncate().length() / 2.0;
-    let cells = &ground.cells;
+    let cells = &ground.surfaces.cells;
     let steps = (half / cells.side).ceil() as i64;
     let aside = (ROOM_M * ground.scale / cells.side).ceil() as i64;
     let highest = |ahead: DVec2| {
@@ -88,8 +93,9 @@ fn corridor(ground: &Ground) -> (f64, f64) {
         lines
             .flat_map(|line| (-steps..=steps).map(move |step| (line, step)))
             .filter_map(|(line, step)| {
-                let place = centre.truncate() + line + ahead * (step as f64 * cells.side);
-                cells.at(place).map(|cell| f64::from(ground.high[cell].max(ground.height[cell])))
+                let along = ahead * (step as f64 * cells.side);
+                let cell = cells.at(ground.focus.truncate() + line + along)?;
+                Some(f64::from(ground.surfaces.high[cell].max(ground.height[cell])))
             })
             .fold(f64::NEG_INFINITY, f64::max)
     };
@@ -109,9 +115,4 @@ fn corridor(ground: &Ground) -> (f64, f64) {
 #[cfg(test)]
 pub(super) fn circle_frames(frames: usize) -> usize {
     (CIRCLE_PART * (frames - 1) as f64) as usize
-}
-
-#[cfg(test)]
-pub(super) fn centre(ground: &Ground) -> glam::DVec3 {
-    ground.plan.source(ground.sphere().0)
 }

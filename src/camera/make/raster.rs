@@ -1,6 +1,6 @@
 //! The lowest and highest surface over each cell of a map.
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// Cells that triangles may cover in all, as a multiple of a map's cells. What lies layer upon
 /// layer beyond that counts only at its corners, so that no input takes forever.
@@ -32,6 +32,50 @@ impl Cells {
         inside.then(|| cell.y as usize * self.columns + cell.x as usize)
     }
 
+    /// The cells in a rectangle.
+    pub(super) fn within(&self, low: DVec2, high: DVec2) -> impl Iterator<Item = usize> + '_ {
+        let count = DVec2::new(self.columns as f64, self.rows as f64);
+        let cell = |place: DVec2| ((place - self.corner) / self.side).clamp(DVec2::ZERO, count);
+        let (from, to) = (cell(low).floor(), cell(high).ceil());
+        (from.y as usize..to.y as usize).flat_map(move |row| {
+            (from.x as usize..to.x as usize).map(move |column| row * self.columns + column)
+        })
+    }
+
+    /// The cells that a line crosses from `from` metres along it to `to`, in order (Amanatides and
+    /// Woo 1987); none outside of the map. `ahead` has length 1 and is along neither axis.
+    pub(super) fn along(
+        &self,
+        start: DVec2,
+        ahead: DVec2,
+        [from, to]: [f64; 2],
+    ) -> impl Iterator<Item = usize> + '_ {
+        let size = DVec2::new(self.columns as f64, self.rows as f64);
+        let begin = (start - self.corner) / self.side;
+        let (first, last) = (-begin / ahead, (size - begin) / ahead);
+        let enter = first.min(last).max_element().max(from / self.side);
+        let leave = first.max(last).min_element().min(to / self.side);
+        let at = (begin + ahead * enter).clamp(DVec2::ZERO, size - 0.5);
+        let mut cell = at.floor();
+        let step = ahead.signum();
+        // Where it leaves the cell along each axis, in cells from the start.
+        let border = cell + step.max(DVec2::ZERO);
+        let mut next = (border - begin) / ahead;
+        let each = ahead.recip().abs();
+        let mut is_done = enter > leave;
+        std::iter::from_fn(move || {
+            if is_done {
+                return None;
+            }
+            let here = cell.y as usize * self.columns + cell.x as usize;
+            let axis = usize::from(next.y < next.x);
+            cell[axis] += step[axis];
+            is_done = next[axis] > leave || cell[axis] < 0.0 || cell[axis] >= size[axis];
+            next[axis] += each[axis];
+            Some(here)
+        })
+    }
+
     /// The middle of a cell.
     pub(super) fn middle(&self, cell: usize) -> DVec2 {
         let place = DVec2::new((cell % self.columns) as f64, (cell / self.columns) as f64);
@@ -59,6 +103,9 @@ pub(super) struct Surfaces {
     pub(super) low: Vec<f32>,
     /// The highest surface within each cell.
     pub(super) high: Vec<f32>,
+    /// The part of each cell that its surfaces are over or under: a rectangle, as least and greatest
+    /// x and y in cells from its corner, 0 to 1.
+    rectangles: Vec<[Vec2; 2]>,
     visits_left: u64,
 }
 
@@ -69,6 +116,7 @@ impl Surfaces {
             cells,
             low: vec![f32::INFINITY; count],
             high: vec![f32::NEG_INFINITY; count],
+            rectangles: vec![[Vec2::INFINITY, Vec2::NEG_INFINITY]; count],
             visits_left: count as u64 * MAX_LAYERS,
         }
     }
@@ -94,14 +142,14 @@ impl Surfaces {
             (max.y as usize).min(self.cells.rows - 1),
         ];
         if first == last {
-            self.put(first[0], first[1], min.z, max.z);
+            self.put(first, [min, max]);
             return;
         }
         let covered = (last[0] - first[0] + 1) as u64 * (last[1] - first[1] + 1) as u64;
         if covered > self.visits_left {
             for place in triangle {
                 if place.x >= 0.0 && place.y >= 0.0 && place.x < columns && place.y < rows {
-                    self.put(place.x as usize, place.y as usize, place.z, place.z);
+                    self.put([place.x as usize, place.y as usize], [place, place]);
                 }
             }
             return;
@@ -114,17 +162,27 @@ impl Surfaces {
             let end = (right.max(0.0) as usize).min(self.cells.columns - 1);
             for column in begin..=end {
                 if let Some(piece) = strip.between(0, column as f32) {
-                    let (low, high) = piece.range(2);
-                    self.put(column, row, low, high);
+                    self.put([column, row], piece.bounds());
                 }
             }
         }
     }
 
-    fn put(&mut self, column: usize, row: usize, low: f32, high: f32) {
+    fn put(&mut self, [column, row]: [usize; 2], [min, max]: [Vec3; 2]) {
         let cell = row * self.cells.columns + column;
-        self.low[cell] = self.low[cell].min(low);
-        self.high[cell] = self.high[cell].max(high);
+        self.low[cell] = self.low[cell].min(min.z);
+        self.high[cell] = self.high[cell].max(max.z);
+        let corner = Vec2::new(column as f32, row as f32);
+        let [least, greatest] = &mut self.rectangles[cell];
+        *least = least.min(min.truncate() - corner);
+        *greatest = greatest.max(max.truncate() - corner);
+    }
+
+    /// The rectangle within a cell that its surfaces are over or under, on the map.
+    pub(super) fn rectangle(&self, cell: usize) -> [DVec2; 2] {
+        let Cells { corner, side, columns, .. } = self.cells;
+        let first = DVec2::new((cell % columns) as f64, (cell / columns) as f64);
+        self.rectangles[cell].map(|at| corner + (first + at.as_dvec2()) * side)
     }
 
     /// True where a cell has any surface.
@@ -179,11 +237,15 @@ impl Polygon {
     }
 
     fn range(&self, axis: usize) -> (f32, f32) {
-        self.corners[..self.count]
-            .iter()
-            .fold((f32::INFINITY, f32::NEG_INFINITY), |range, place| {
-                (range.0.min(place[axis]), range.1.max(place[axis]))
-            })
+        let [min, max] = self.bounds();
+        (min[axis], max[axis])
+    }
+
+    fn bounds(&self) -> [Vec3; 2] {
+        let corners = &self.corners[..self.count];
+        corners.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[min, max], &corner| {
+            [min.min(corner), max.max(corner)]
+        })
     }
 }
 
@@ -239,5 +301,49 @@ mod tests {
         assert_eq!(cells.at(DVec2::new(-10.1, 21.0)), None);
         assert_eq!(cells.at(DVec2::new(-2.0, 21.0)), None);
         assert_eq!(cells.around(0).map(|(cell, _)| cell).collect::<Vec<_>>(), [1, 4, 5]);
+    }
+
+    #[test]
+    fn a_line_crosses_the_cells_that_are_found_by_small_steps() {
+        let cells = flat(9, 7).cells;
+        let lines = [(-15.0, 26.3), (1.1, 25.7), (-9.99, 33.9), (20.0, 40.0), (-30.0, 10.0)];
+        for ((x, y), index) in lines.into_iter().flat_map(|start| (0..40).map(move |i| (start, i)))
+        {
+            let start = DVec2::new(x, y);
+            let ahead = DVec2::from_angle(0.01 + f64::from(index) * 0.157);
+            for range in [[0.0, f64::INFINITY], [3.0, 11.0]] {
+                let found: Vec<usize> = cells.along(start, ahead, range).collect();
+                let last = range[1].min(200.0);
+                let steps = (0..).map(|step| range[0] + f64::from(step) * 1e-3);
+                let steps = steps.take_while(|&step| step < last);
+                let mut expected: Vec<usize> =
+                    steps.filter_map(|step| cells.at(start + ahead * step)).collect();
+                expected.dedup();
+                // Small steps miss corners that are cut by less.
+                let mut rest = found.iter();
+                assert!(
+                    expected.iter().all(|cell| rest.any(|other| other == cell)),
+                    "{start} {index}"
+                );
+                let missed = found.len() - expected.len();
+                assert!(missed <= 1, "{missed} of {} at {start} {index}", found.len());
+            }
+        }
+    }
+
+    #[test]
+    fn a_rectangle_is_what_triangles_cover_of_a_cell() {
+        let mut surfaces = flat(10, 10);
+        let at = |x: f64, y: f64| DVec3::new(x - 10.0, y + 20.0, 0.0);
+        // A thin wall along x through the cells of row 3, and a corner within one cell.
+        surfaces.add([at(1.0, 7.0), at(5.0, 7.0), at(1.0, 7.0) + DVec3::Z]);
+        surfaces.add([at(14.5, 14.25), at(15.5, 14.25), at(14.5, 15.75)]);
+        let near = |[a, b]: [DVec2; 2], c: [DVec3; 2]| {
+            a.distance(c[0].truncate()) < 1e-5 && b.distance(c[1].truncate()) < 1e-5
+        };
+        assert!(near(surfaces.rectangle(30), [at(1.0, 7.0), at(2.0, 7.0)]));
+        assert!(near(surfaces.rectangle(31), [at(2.0, 7.0), at(4.0, 7.0)]));
+        assert!(near(surfaces.rectangle(32), [at(4.0, 7.0), at(5.0, 7.0)]));
+        assert!(near(surfaces.rectangle(77), [at(14.5, 14.25), at(15.5, 15.75)]));
     }
 }

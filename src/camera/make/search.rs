@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use super::ground::Ground;
 use super::streets::Streets;
 
 /// The price of a cell's side at best, and of its diagonal.
@@ -12,64 +13,31 @@ const DIAGONAL: u64 = 91;
 const ROOM_M: f64 = 3.0;
 /// How much dearer a metre is right beside a wall.
 const TIGHT: f64 = 3.0;
-/// How much dearer a metre is where nothing is built.
-const OUTSIDE: f64 = 1.5;
-/// How much dearer a metre is where the scene has no surface.
-const BARE: f64 = 1.0;
-/// Built-up share at which a place is as good as any other.
-const BUILT_ENOUGH: f32 = 0.2;
-/// How much dearer a metre is that was gone before.
-const AGAIN: u64 = 3;
+/// How much dearer a metre is where nothing of the model is seen.
+const BLIND: f64 = 20.0;
+/// Where a picture can show this part of the model, a place is as good as any other.
+const SEEN: f64 = 0.55;
 
-/// Prices of cells, in 64ths: 64 a cell at best, 0 where one cannot go.
-pub(super) struct Prices {
-    prices: Vec<u32>,
+/// The price of each cell, in 64ths: 64 at best, 0 where one cannot go.
+pub(super) fn prices(ground: &Ground, is_open: &[bool]) -> Vec<u32> {
+    let room = (ROOM_M * ground.scale) as f32;
+    let price = |cell: usize| {
+        if !is_open[cell] {
+            return 0;
+        }
+        let tight = 1.0 - (ground.clearance[cell] / room).min(1.0);
+        let seen = f64::from(ground.sight.at(ground.surfaces.cells.middle(cell)).level);
+        let blind = 1.0 - (seen / SEEN).min(1.0);
+        let dearer = 1.0 + TIGHT * f64::from(tight) + BLIND * blind;
+        (dearer * 64.0) as u32
+    };
+    (0..is_open.len()).map(price).collect()
 }
 
-impl Prices {
-    pub(super) fn new(streets: &Streets<'_>) -> Self {
-        let ground = streets.ground;
-        let room = (ROOM_M * ground.scale) as f32;
-        let price = |cell: usize| {
-            if !streets.is_open[cell] {
-                return 0;
-            }
-            let tight = 1.0 - (ground.clearance[cell] / room).min(1.0);
-            let outside = 1.0 - (ground.built[cell] / BUILT_ENOUGH).min(1.0);
-            let bare = if ground.is_covered(cell) { 0.0 } else { BARE };
-            let dearer = 1.0 + TIGHT * f64::from(tight) + OUTSIDE * f64::from(outside) + bare;
-            (dearer * 64.0) as u32
-        };
-        Self { prices: (0..ground.cells.len()).map(price).collect() }
-    }
-
-    /// Makes cells within `reach` cells of a way dearer.
-    pub(super) fn mark(&mut self, streets: &Streets<'_>, way: &[usize], reach: usize) {
-        let cells = &streets.ground.cells;
-        let mut near = std::collections::BTreeSet::new();
-        for &cell in way {
-            let (column, row) = (cell % cells.columns, cell / cells.columns);
-            for y in row.saturating_sub(reach)..(row + reach + 1).min(cells.rows) {
-                let from = y * cells.columns + column.saturating_sub(reach);
-                let to = y * cells.columns + (column + reach + 1).min(cells.columns);
-                near.extend(from..to);
-            }
-        }
-        for cell in near {
-            // Never so dear that a long way could overflow.
-            let again = u64::from(self.prices[cell]) * AGAIN;
-            self.prices[cell] = again.min(64 * 64) as u32;
-        }
-    }
-
+impl Streets<'_> {
     /// The cells from `start` to `goal`, both included; `None` where there is no way (A*).
-    pub(super) fn way(
-        &self,
-        streets: &Streets<'_>,
-        start: usize,
-        goal: usize,
-    ) -> Option<Vec<usize>> {
-        let cells = &streets.ground.cells;
+    pub(super) fn way(&self, start: usize, goal: usize) -> Option<Vec<usize>> {
+        let cells = &self.ground.surfaces.cells;
         let at_least = |cell: usize| {
             let across = (cell % cells.columns).abs_diff(goal % cells.columns) as u64;
             let along = (cell / cells.columns).abs_diff(goal / cells.columns) as u64;

@@ -4,8 +4,12 @@ use glam::DVec3;
 
 use super::plan::yaw_deg;
 
-/// Degrees a second that the camera turns at most while it follows a route.
-pub const MAX_TURN_DEG_S: f64 = 60.0;
+/// Degrees a second that the camera turns at most while it walks along a route.
+pub const MAX_TURN_DEG_S: f64 = 70.0;
+/// And while it drives, which takes it round the same corners faster.
+pub const MAX_DRIVING_TURN_DEG_S: f64 = 120.0;
+/// The part of these that is yaw: it may look further down at the same time.
+pub(super) const YAW_PART: f64 = 0.75;
 /// Seconds that the camera looks ahead along its route.
 const LOOK_AHEAD_S: f64 = 1.0;
 /// Half the time over which turns are evened out, twice, seconds.
@@ -40,12 +44,16 @@ pub(super) fn yaws(places: &[DVec3], fps: f64) -> Vec<f64> {
         yaws.push(yaw);
     }
     let even = even_frames(fps);
-    let mut yaws = evened(&evened(&yaws, even), even);
-    let most = MAX_TURN_DEG_S / fps;
-    for index in 1..yaws.len() {
-        yaws[index] = yaws[index].clamp(yaws[index - 1] - most, yaws[index - 1] + most);
+    evened(&evened(&yaws, even), even)
+}
+
+/// Holds each yaw where it would turn by more than `most` degrees from the one before.
+pub(super) fn slow_down<'a>(yaws: impl Iterator<Item = &'a mut f64>, most: f64) {
+    let mut before: Option<f64> = None;
+    for yaw in yaws {
+        *yaw = before.map_or(*yaw, |before| yaw.clamp(before - most, before + most));
+        before = Some(*yaw);
     }
-    yaws
 }
 
 /// Degrees from one yaw to another the shorter way, −180 to 180.
@@ -80,7 +88,8 @@ mod tests {
         let places: Vec<DVec3> = (0..900)
             .map(|index| DVec3::new(450.0 - (f64::from(index) - 450.0).abs(), 5.0, 0.0))
             .collect();
-        let yaws = yaws(&places, fps);
+        let mut yaws = yaws(&places, fps);
+        slow_down(yaws.iter_mut(), MAX_TURN_DEG_S / fps);
         assert_eq!(yaws.len(), 900 - ahead(fps));
         assert!(yaws[0].abs() < 1e-9);
         assert!((yaws[yaws.len() - 1].abs() - 180.0).abs() < 1e-6);

@@ -27,3 +27,18 @@ pub fn run_build(folder: &Path, arguments: &[&str]) -> String {
 pub fn build_with(inputs: &[PathBuf], out: &Path, options: &BuildOptions) -> Outcome {
     build(inputs, out, options, &Silent).unwrap()
 }
+
+/// A set of the real data, `HLOD_DATA` or `../shared/data` beside the repository; `None`, said, where
+/// it is not there.
+pub fn data(set: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("HLOD_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
+    let path = folder.join(set);
+    if path.exists() {
+        return Some(path);
+    }
+    println!("skipped: {} is not there", path.display());
+    None
+}
