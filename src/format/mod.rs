@@ -34,6 +34,7 @@ mod scene_write;
 mod test_mesh;
 #[cfg(test)]
 pub(crate) mod test_scene;
+mod viewer_error;
 
 pub use encoding::Encoding;
 pub use file_name::is_plain_file_name;

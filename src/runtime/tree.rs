@@ -24,6 +24,8 @@ pub struct TreeNode {
     pub average_normal: DVec3,
     /// Bound on the distance to the source, metres.
     pub geometric_error: f64,
+    /// The error by which viewers choose a level, metres: [`Scene::viewer_errors`].
+    pub viewer_error: f64,
     /// Number of triangles.
     pub triangles: u32,
     /// Number of triangles with a texture.
@@ -61,6 +63,7 @@ pub struct SceneTree {
 impl SceneTree {
     /// The hierarchy of a scene that was [checked](Scene::check).
     pub fn new(scene: &Scene) -> Self {
+        let errors = scene.viewer_errors();
         let mut indices: Vec<u32> = scene.roots().collect();
         let roots = indices.len() as u32;
         let mut nodes = Vec::with_capacity(scene.nodes.len());
@@ -76,6 +79,7 @@ impl SceneTree {
                 static_benefit: node.static_benefit,
                 average_normal: DVec3::from(node.average_normal.map(f64::from)),
                 geometric_error: node.geometric_error,
+                viewer_error: errors[index as usize],
                 triangles: node.triangles,
                 textured_triangles: node.textured_triangles,
                 vertices: node.vertices,

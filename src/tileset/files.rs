@@ -101,7 +101,7 @@ impl Writer<'_> {
     /// From the leaves up, each tile takes its children into its file until there are too many;
     /// then the largest of them become files.
     fn tile(&mut self, tile: Tile, depth: usize) -> Pending {
-        let Tile { low, high, error, typical_error, content, transform, children, .. } = tile;
+        let Tile { low, high, error, distances, content, transform, children, .. } = tile;
         let mut below: Vec<Pending> =
             children.into_iter().map(|child| self.tile(child, depth + 1)).collect();
         loop {
@@ -129,8 +129,9 @@ impl Writer<'_> {
         if depth == 0 {
             json.insert("refine".into(), json!("REPLACE"));
         }
-        if let Some([mean, p95]) = typical_error.filter(|_| !below.is_empty()) {
-            json.insert("extras".into(), json!({ "meanError": mean, "p95Error": p95 }));
+        if let Some([bound, mean, p95]) = distances.filter(|_| !below.is_empty()) {
+            let extras = json!({ "boundError": bound, "meanError": mean, "p95Error": p95 });
+            json.insert("extras".into(), extras);
         }
         if let Some(uri) = content {
             json.insert("content".into(), json!({ "uri": uri }));

@@ -11,7 +11,8 @@ const PARTS: usize = 4;
 
 /// The root of a scene; its boxes enclose nothing yet but their own content.
 pub fn root(scene: &Scene) -> Tile {
-    region(scene.roots().map(|root| Tile::of_node(scene, root)).collect())
+    let errors = scene.viewer_errors();
+    region(scene.roots().map(|root| Tile::of_node(scene, &errors, root)).collect())
 }
 
 fn region(tiles: Vec<Tile>) -> Tile {

@@ -38,8 +38,10 @@ pub fn check(out: &Path, scene: &Scene, placement: &Placement) -> Result<Checked
     let globe = placement.globe()?;
     let mut walk = Walk::new(out);
     let mut faults = std::mem::take(&mut walk.faults);
-    let nodes: BTreeMap<String, &Node> =
-        scene.nodes.iter().map(|node| (format!("{NODES_DIR}/{}", node.file), node)).collect();
+    let errors = scene.viewer_errors();
+    let nodes = scene.nodes.iter().zip(errors);
+    let nodes: BTreeMap<String, (&Node, f64)> =
+        nodes.map(|(node, error)| (format!("{NODES_DIR}/{}", node.file), (node, error))).collect();
     let mut shown: BTreeMap<&str, usize> = BTreeMap::new();
     let mut placed_within = globe.as_ref().map(|_| 0.0);
     for tile in &walk.tiles {
@@ -49,13 +51,12 @@ pub fn check(out: &Path, scene: &Scene, placement: &Placement) -> Result<Checked
         }
         let Some(content) = &tile.content else { continue };
         *shown.entry(content).or_default() += 1;
-        let Some(node) = nodes.get(content) else {
+        let Some(&(node, error)) = nodes.get(content) else {
             fault(format!("content {content}: expected a node of the scene"));
             continue;
         };
-        if tile.error != node.geometric_error {
-            let (stored, found) = (node.geometric_error, tile.error);
-            fault(format!("geometricError: expected the node's {stored}, found {found}"));
+        if tile.error != error {
+            fault(format!("geometricError: expected the node's {error}, found {}", tile.error));
         }
         if tile.replaced != node.first_child.is_some() {
             fault("children: expected as the scene has them".into());

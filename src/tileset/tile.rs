@@ -12,11 +12,11 @@ pub struct Tile {
     pub low: DVec3,
     /// See [`Tile::low`].
     pub high: DVec3,
-    /// Metres; never less than those below.
+    /// By which a viewer chooses it, metres; never less than those below.
     pub error: f64,
-    /// Mean and 95th percentile of the distance to the source, metres; `None` where the tile only
-    /// groups others.
-    pub typical_error: Option<[f64; 2]>,
+    /// Bound, mean and 95th percentile of the distance to the source, metres; `None` where the tile
+    /// only groups others.
+    pub distances: Option<[f64; 3]>,
     /// A node's file, relative to the output folder; `None` where the tile only groups others.
     pub content: Option<String>,
     /// From its coordinates to its parent's; `None` where they are the same.
@@ -28,18 +28,21 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// The tile of a node and all below it.
-    pub fn of_node(scene: &Scene, index: u32) -> Self {
+    /// The tile of a node and all below it, by [`Scene::viewer_errors`].
+    pub fn of_node(scene: &Scene, errors: &[f64], index: u32) -> Self {
         let node = &scene.nodes[index as usize];
         let (low, high) = z_up(scene.up, node.bbox_min, node.bbox_max);
         Self {
             low,
             high,
-            error: node.geometric_error,
-            typical_error: Some([node.mean_error, node.p95_error]),
+            error: errors[index as usize],
+            distances: Some([node.geometric_error, node.mean_error, node.p95_error]),
             content: Some(format!("{NODES_DIR}/{}", node.file)),
             transform: None,
-            children: scene.children(index).map(|child| Self::of_node(scene, child)).collect(),
+            children: scene
+                .children(index)
+                .map(|child| Self::of_node(scene, errors, child))
+                .collect(),
             fit: None,
         }
     }
@@ -76,7 +79,7 @@ impl Tile {
             low,
             high,
             error,
-            typical_error: None,
+            distances: None,
             content: None,
             transform: None,
             children,

@@ -126,7 +126,7 @@ struct ScreenError {
 fn screen_error(node: &TreeNode, view: &View) -> f64 {
     let nearest = view.pose.position.clamp(node.bbox[0], node.bbox[1]);
     let distance = view.pose.position.distance(nearest).max(NEAREST);
-    node.geometric_error * view.pixels_per_metre() / distance
+    node.viewer_error * view.pixels_per_metre() / distance
 }
 
 impl ScreenError {
