@@ -9,9 +9,9 @@ impl Scene {
     /// By index of a node: the error in metres by which viewers choose its level, 3D Tiles'
     /// `geometricError`.
     ///
-    /// It is four times the distance that 95 of 100 points are within (or the mean,
-    /// where few points are very far away and that is larger), the bound where that is less, and
-    /// never less than that of a node below. At the 16 pixels that viewers begin with, a node is drawn
+    /// It is four times the distance that 95 of 100 points are within (or the mean, where few points
+    /// are very far away and that is larger), the bound where that is less, and never less than that
+    /// of a node below. At the 16 pixels that viewers begin with, a node is drawn
     /// of which 95 of 100 points are within 4 pixels, or all within 16. The bound alone is that of the
     /// worst point: one chimney without a counterpart makes it as large as the house, and refines the
     /// node from far away. docs/choices.md compares them by the images of equally many triangles.

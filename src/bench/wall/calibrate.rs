@@ -26,7 +26,7 @@ const POSES: usize = 6;
 /// Diagonals of the scene between its middle and the place from which it fills little.
 const FAR: f64 = 2.0;
 /// Pixels of error for which nodes are chosen to be measured: frames long and short.
-const ERRORS_PIXELS: [f64; 4] = [16.0, 4.0, 1.0, 0.25];
+const ERRORS_PIXELS: [f64; 4] = [64.0, 16.0, 4.0, 1.0];
 /// No more triangles than this are measured in a frame.
 const MOST_TRIANGLES: u64 = 400_000;
 

@@ -97,17 +97,18 @@ impl<'a> View<'a> {
 pub(super) fn above(ground: &Ground, anchor: DVec3, away: DVec2) -> Eye {
     let view = |elevation: f64| {
         let (sin, cos) = libm::sincos(elevation.to_radians());
-        let view = View::new(ground, anchor, (away * cos).extend(sin));
+        View::new(ground, anchor, (away * cos).extend(sin))
+    };
+    let mut views = ELEVATIONS_DEG.into_iter().map(view);
+    if let Some(view) = views.find(|view| view.seen(1.0) >= ENOUGH) {
+        return view.eye(1.0);
+    }
+    let part = |elevation: f64| {
+        let view = view(elevation);
         let (part, seen) = view.farthest();
         (view.eye(part), seen)
     };
-    let all = |elevation: f64| {
-        let (sin, cos) = libm::sincos(elevation.to_radians());
-        let view = View::new(ground, anchor, (away * cos).extend(sin));
-        (view.seen(1.0) >= ENOUGH).then(|| view.eye(1.0))
-    };
-    let all = ELEVATIONS_DEG.into_iter().find_map(all);
-    all.unwrap_or_else(|| best(view).unwrap_or_default())
+    best(part).unwrap_or_default()
 }
 
 /// A way around the city: `out` is the direction from it at a part of the way, 0 to 1, that is

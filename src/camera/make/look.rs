@@ -138,7 +138,7 @@ impl Search {
             }
             let mut from = Vec::new();
             for (prices, yaws) in prices[begin + 1..end].iter().zip(yaws[begin..end].windows(2)) {
-                let turned = yaws[1] - yaws[0];
+                let turned = travel::turn(yaws[0], yaws[1]);
                 let ways = (0..least.len()).map(|to| self.cheapest(&least, to, turned));
                 let (costs, before): (Vec<f64>, Vec<usize>) = ways.unzip();
                 least = costs.iter().zip(prices).map(|(cost, price)| cost + price).collect();

@@ -59,10 +59,12 @@ impl Panorama {
 
     /// The part of a picture in which there is a surface, 0 to 1.
     pub(super) fn part(&self, picture: &Picture, yaw_deg: f64) -> f64 {
-        let turned = yaw_deg / 360.0 * AZIMUTHS as f64;
+        // Points are less than a turn to the right: what is truncated is never negative.
+        let turned = (yaw_deg / 360.0 * AZIMUTHS as f64).rem_euclid(AZIMUTHS as f64);
+        let nearest = turned + AZIMUTHS as f64 + 0.5;
         let seen = picture.points.iter().filter(|(aside, bit)| {
-            let azimuth = (turned + aside).round().rem_euclid(AZIMUTHS as f64) as usize;
-            self.columns[azimuth % AZIMUTHS] >> bit & 1 == 1
+            let azimuth = (nearest + aside) as usize % AZIMUTHS;
+            self.columns[azimuth] >> bit & 1 == 1
         });
         seen.count() as f64 / f64::from(POINTS[0] * POINTS[1])
     }
