@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use glam::DVec3;
+use hlod::camera::{View, read_path};
 use serde_json::Value;
 
 use crate::adapter::skip;
@@ -142,7 +144,14 @@ fn where_all_leaves_are_drawn_their_picture_is_that_of_the_reference() {
 fn a_leaf_that_cannot_be_read_is_told_of() {
     let place = Place::new(city());
     let scene = place.scene();
-    let leaf = (0..scene.nodes.len() as u32).find(|&node| scene.children(node).next().is_none());
+    let path = read_path(&place.path().join("orbit.csv"), scene.up).unwrap();
+    let view = View::new(path.frames[0].pose, DVec3::ZERO, [160, 90]);
+    let is_leaf = |&node: &u32| scene.children(node).next().is_none();
+    let leaf = (0..scene.nodes.len() as u32).filter(is_leaf).find(|&leaf| {
+        let node = &scene.nodes[leaf as usize];
+        let middle = (DVec3::from(node.bbox_min) + DVec3::from(node.bbox_max)) / 2.0;
+        view.frustum.outside([middle, middle]) <= 0.0
+    });
     fs::write(node_file(&place, leaf.unwrap()), b"no").unwrap();
     let run = ["out", "orbit.csv", "--clock", "model", "--size", "160x90", "-q"];
     if !ran(&place, &[&run[..], &["--reference-every", "5", "--out", "r"]].concat(), INPUT) {
