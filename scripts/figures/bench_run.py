@@ -16,7 +16,7 @@ def columns(programs, example):
 def main():
     programs = Programs(examples=["selection_time", "priority_list"], bins=False)
     selection = table(
-        ["nodes of the scene", "visited", "drawn", "ms a frame"],
+        ["policy", "nodes of the scene", "visited", "drawn", "selection, ms", "rest of the engine, ms"],
         columns(programs, "selection_time"),
     )
     lists = table(

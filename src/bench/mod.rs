@@ -5,6 +5,8 @@ mod clock;
 mod compare;
 mod model_backend;
 mod model_load;
+#[cfg(feature = "render")]
+mod node_cache;
 mod options;
 pub mod policies;
 mod record;

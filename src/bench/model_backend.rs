@@ -91,7 +91,8 @@ impl Backend for ModelBackend<'_> {
         let cold = cold_byte * self.cold_bytes as f64;
         let (factor, stall_ms) = self.chance();
         self.frames += 1;
-        Ok(Drawn { draw_ms: factor * (prices.frame + both + cold) + stall_ms })
+        let draw_ms = factor * (prices.frame + both + cold) + stall_ms;
+        Ok(Drawn { draw_ms, gpu_ms: None })
     }
 
     fn end_frame(

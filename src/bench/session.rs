@@ -27,7 +27,7 @@ pub struct Session {
 impl Session {
     /// Opens what `hlod-build` wrote into `dir`.
     pub fn open(dir: &Path) -> Result<Self> {
-        let scene = Arc::new(Scene::read(dir)?);
+        let scene = Arc::new(Scene::read(dir)?.breadth_first());
         let tree = SceneTree::new(&scene);
         Ok(Self { dir: dir.to_owned(), scene, tree })
     }

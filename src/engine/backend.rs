@@ -60,4 +60,6 @@ pub type Inspect<'a> = dyn FnMut(Option<RgbaImage>) -> Result<()> + 'a;
 pub struct Drawn {
     /// Milliseconds until the image was complete.
     pub draw_ms: f64,
+    /// Milliseconds of this that the graphics card took by its own clock, where it has one.
+    pub gpu_ms: Option<f64>,
 }

@@ -4,10 +4,12 @@
 //! Prices are fitted by least squares of relative errors over the frames drawn, older ones counting
 //! less, and towards what was expected at first as far as frames say nothing. What prices do not
 //! explain changes slowly, since views do: how much longer than their sum the last frames took is a
-//! factor of the next.
+//! factor of the next. Where the graphics card has a clock of its own, what it takes and what the
+//! processor takes beside it are fitted apart.
 
 use serde::{Deserialize, Serialize};
 
+use super::host_time::HostTime;
 use super::least_squares::{LeastSquares, dot};
 
 /// Number of terms.
@@ -52,6 +54,12 @@ pub struct Load {
     /// Bytes uploaded.
     pub uploaded_bytes: f64,
 }
+
+/// The terms of what the processor takes: the frame, draw calls, bytes uploaded.
+const HOST_TERMS: [usize; 3] = [0, 1, UPLOADED];
+
+/// Uploads are waited for by the processor.
+const UPLOADED: usize = 7;
 
 /// An ordinary load, by which terms are made comparable.
 const ORDINARY: [f64; TERMS] = [1.0, 100.0, 1e5, 1e5, 1e6, 1e6, 1e6, 1e6];
@@ -145,10 +153,13 @@ pub struct Estimate {
 /// Learns prices from frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CostModel {
-    /// In ordinary loads, as are the next.
+    /// In ordinary loads, as are the next; of the graphics card alone once its time is known.
     prices: [f64; TERMS],
     expected: [f64; TERMS],
+    prior: f64,
     frames: LeastSquares<TERMS>,
+    /// Once the time of the graphics card is known.
+    host: Option<HostTime>,
     /// Logarithm of what the last frames took over the sum of their prices.
     drift: f64,
     /// Sums over frames of 1, of relative errors, and of their squares.
@@ -163,12 +174,21 @@ impl CostModel {
         // As frames weigh in which each term is ordinary.
         let prior = if whole > 0.0 { PRIOR_FRAMES / (whole * whole) } else { PRIOR_FRAMES };
         let frames = LeastSquares::new(expected, prior);
-        Self { prices: expected, expected, frames, drift: 0.0, errors: [0.0; 3] }
+        Self { prices: expected, expected, prior, frames, host: None, drift: 0.0, errors: [0.0; 3] }
     }
 
     /// What things take, as far as is known.
     pub fn prices(&self) -> Prices {
-        Prices::from_ordinary(self.prices)
+        Prices::from_ordinary(self.sums())
+    }
+
+    /// What card and processor take together.
+    fn sums(&self) -> [f64; TERMS] {
+        let mut sums = self.prices;
+        for (price, term) in self.host.iter().flat_map(|host| host.prices()).zip(HOST_TERMS) {
+            sums[term] += price;
+        }
+        sums
     }
 
     /// What the next frame should take.
@@ -187,12 +207,12 @@ impl CostModel {
     /// [`estimate`](Self::estimate), which follows each frame's noise a little, levels toggle two to four
     /// times as often.
     pub fn priced_ms(&self, load: &Load) -> f64 {
-        dot(&self.prices, &load.terms())
+        dot(&self.sums(), &load.terms())
     }
 
     /// Milliseconds of that which a load adds to a frame that is drawn anyway.
     pub fn added_ms(&self, load: &Load) -> f64 {
-        self.priced_ms(load) - self.prices[0]
+        self.priced_ms(load) - self.sums()[0]
     }
 
     /// Mean of (estimated − actual) / actual over the frames of late.
@@ -207,9 +227,9 @@ impl CostModel {
         if frames > 0.0 { (squares / frames).sqrt() } else { 0.0 }
     }
 
-    /// A frame took `actual_ms`, `dt_s` seconds after the one before. What is no number or took no time
-    /// is passed over.
-    pub fn observe(&mut self, load: &Load, actual_ms: f64, dt_s: f64) {
+    /// A frame took `actual_ms`, `dt_s` seconds after the one before; `gpu_ms` of this on the graphics
+    /// card, where that is known. What is no number or took no time is passed over.
+    pub fn observe(&mut self, load: &Load, actual_ms: f64, gpu_ms: Option<f64>, dt_s: f64) {
         let terms = load.terms();
         let is_sound =
             actual_ms > LEAST_MS && terms.iter().chain([&actual_ms]).all(|x| x.is_finite());
@@ -224,11 +244,42 @@ impl CostModel {
         self.errors = [frames + 1.0, sum + error, squares + error * error];
         // Relative errors count: a frame of 100 ms must not outweigh a hundred of 10.
         let weight = 1.0 / (actual_ms * actual_ms);
-        self.frames.observe(&terms, actual_ms, weight, kept);
-        self.frames.fit(&mut self.prices);
-        let unexplained = libm::log(actual_ms / dot(&self.prices, &terms).max(LEAST_MS));
+        self.learn(terms, actual_ms, gpu_ms, weight, kept);
+        let unexplained = libm::log(actual_ms / dot(&self.sums(), &terms).max(LEAST_MS));
         let more = (unexplained - self.drift).clamp(-MOST_DRIFT, MOST_DRIFT);
         self.drift += (1.0 - libm::exp2(-dt_s / DRIFT_HALF_LIFE_S)) * more;
+    }
+
+    fn learn(
+        &mut self,
+        mut terms: [f64; TERMS],
+        actual_ms: f64,
+        gpu_ms: Option<f64>,
+        weight: f64,
+        kept: f64,
+    ) {
+        let of_host = HOST_TERMS.map(|term| terms[term]);
+        let known_ms = gpu_ms.filter(|&ms| ms > 0.0 && ms < actual_ms);
+        if known_ms.is_some() && self.host.is_none() {
+            self.host = Some(HostTime::new([0.0, 0.0, self.prices[UPLOADED]], self.prior));
+        }
+        let mut card_ms = actual_ms;
+        if let Some(host) = &mut self.host {
+            match known_ms {
+                Some(ms) => {
+                    host.observe(of_host, actual_ms - ms, weight, kept);
+                    card_ms = ms;
+                }
+                // The card did not tell this time.
+                None => card_ms = (actual_ms - host.ms(of_host)).max(LEAST_MS),
+            }
+            terms[UPLOADED] = 0.0;
+        }
+        self.frames.observe(&terms, card_ms, weight, kept);
+        self.frames.fit(&mut self.prices);
+        if self.host.is_some() {
+            self.prices[UPLOADED] = 0.0;
+        }
     }
 }
 
@@ -263,6 +314,10 @@ mod tests {
         }
     }
 
+    fn zero() -> Prices {
+        Prices::from_ordinary([0.0; TERMS])
+    }
+
     fn exact(prices: &Prices, load: &Load) -> f64 {
         dot(&prices.ordinary(), &load.terms())
     }
@@ -275,7 +330,7 @@ mod tests {
             let load = load(&mut random);
             let actual = exact(prices, &load) * (1.0 + noise * (2.0 * random.unit() - 1.0));
             errors.push(model.estimate(&load).mean_ms / actual - 1.0);
-            model.observe(&load, actual, 1.0 / 30.0);
+            model.observe(&load, actual, None, 1.0 / 30.0);
         }
         let late = &errors[frames - 100..];
         let mean = late.iter().sum::<f64>() / 100.0;
@@ -334,12 +389,40 @@ mod tests {
             let unseen = if frame / 60 % 2 == 0 { 1.0 } else { 1.3 };
             let actual = exact(&PRICES, &load) * unseen;
             errors.push((model.estimate(&load).mean_ms / actual - 1.0).abs());
-            model.observe(&load, actual, 1.0 / 30.0);
+            model.observe(&load, actual, None, 1.0 / 30.0);
         }
         let late = &errors[600..];
         let mean = late.iter().sum::<f64>() / late.len() as f64;
         // Without memory of the last frames it would be half of the difference.
         assert!(mean < 0.06, "{mean}");
+    }
+
+    #[test]
+    fn what_the_processor_takes_is_told_from_what_the_card_takes() {
+        // Where every frame has as many triangles for each draw call, its time alone does not tell
+        // which of them take it.
+        let host = Prices { frame: 0.3, draw: 0.05, uploaded_byte: 2e-7, ..zero() };
+        let card = Prices { frame: 0.5, triangle: 1e-4, plain_fragment: 4e-6, ..zero() };
+        let expected = Prices { draw: 0.0, vertex: 0.0, ..PRICES };
+        let mut models = [CostModel::new(&expected), CostModel::new(&expected)];
+        let mut random = Random::new(5, 0);
+        for _ in 0..600 {
+            let load = load(&mut random);
+            let load = Load { draws: load.triangles / 1e3, ..load };
+            let [host_ms, card_ms] = [&host, &card].map(|prices| exact(prices, &load));
+            let gpu_ms = [Some(card_ms), None];
+            for (model, gpu_ms) in models.iter_mut().zip(gpu_ms) {
+                model.observe(&load, host_ms + card_ms, gpu_ms, 1.0 / 30.0);
+            }
+        }
+        // Few triangles in many draw calls.
+        let odd = Load { draws: 100.0, triangles: 1e4, ..Load::default() };
+        let actual = exact(&host, &odd) + exact(&card, &odd);
+        let [apart, together] = [0, 1].map(|at| models[at].priced_ms(&odd) / actual - 1.0);
+        assert!(apart.abs() < 0.02, "{apart}");
+        assert!(together.abs() > 0.1, "{together}: the test shows nothing");
+        let uploaded_byte = models[0].prices().uploaded_byte / host.uploaded_byte;
+        assert!((uploaded_byte - 1.0).abs() < 0.02, "{uploaded_byte}");
     }
 
     #[test]
@@ -349,7 +432,7 @@ mod tests {
         for _ in 0..500 {
             let load = load(&mut random);
             // Dearer the less is drawn.
-            model.observe(&load, 1e6 / load.triangles, 1.0 / 30.0);
+            model.observe(&load, 1e6 / load.triangles, None, 1.0 / 30.0);
             assert!(model.prices.iter().all(|price| *price >= 0.0), "{:?}", model.prices);
         }
     }
@@ -361,11 +444,11 @@ mod tests {
         for actual in odd {
             for value in odd {
                 for dt_s in odd {
-                    model.observe(
-                        &Load { triangles: value, draws: 1.0, ..Load::default() },
-                        actual,
-                        dt_s,
-                    );
+                    let load = Load { triangles: value, draws: 1.0, ..Load::default() };
+                    for gpu_ms in odd {
+                        model.observe(&load, actual, Some(gpu_ms), dt_s);
+                    }
+                    model.observe(&load, actual, None, dt_s);
                 }
             }
         }

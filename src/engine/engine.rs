@@ -13,9 +13,6 @@ use crate::runtime::residency::{Changes, Counters, MemoryUse, Residency};
 use crate::runtime::{SceneTree, ToggleCounter};
 use crate::{Error, Result};
 
-/// Nodes in memory whose priority is renewed in each frame though nothing visited them.
-const STALE_PER_FRAME: usize = 64;
-
 /// What policies see, apart from the view.
 struct Seen<'a> {
     tree: &'a SceneTree,
@@ -143,7 +140,7 @@ impl<'a> Engine<'a> {
         self.backend.priorities_set();
 
         let drawn = self.backend.draw(&self.selection.front, view)?;
-        report.draw_ms = drawn.draw_ms;
+        (report.draw_ms, report.gpu_ms) = (drawn.draw_ms, drawn.gpu_ms);
         report.actual_ms = report.select_ms + report.draw_ms;
         report.frame_ms = report.actual_ms + report.upload_ms;
         self.estimate(view, &changes, &mut report);
@@ -192,7 +189,7 @@ impl<'a> Engine<'a> {
         report.estimated_ms = estimate.ms;
         report.estimated_without_feedback_ms = estimate.without_feedback_ms;
         self.margin.observe(costs.priced_ms(&drawn), report.frame_ms, *dt_s);
-        costs.observe(&whole, report.frame_ms, *dt_s);
+        costs.observe(&whole, report.frame_ms, report.gpu_ms, *dt_s);
     }
 
     /// Nodes that the last frame drew.
@@ -233,7 +230,7 @@ impl<'a> Engine<'a> {
     /// Tells residency what matters now.
     fn set_requests(&mut self, view: &View, report: &mut FrameReport) -> Result<()> {
         let mut residency = lock(&self.residency)?;
-        residency.stale(STALE_PER_FRAME, &mut self.stale);
+        residency.stale(&mut self.stale);
         self.others.clear();
         let input = self.seen.from(view);
         let utility = |&node: &u32| (node, self.policy.utility(&input, node));

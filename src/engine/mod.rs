@@ -10,6 +10,7 @@ mod cost_model;
 #[expect(clippy::module_inception)]
 mod engine;
 mod frame_load;
+mod host_time;
 pub(crate) mod least_squares;
 mod margin;
 pub mod policies;

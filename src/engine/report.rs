@@ -19,6 +19,8 @@ pub struct FrameReport {
     pub upload_ms: f64,
     /// Milliseconds to draw.
     pub draw_ms: f64,
+    /// Milliseconds of this that the graphics card took by its own clock, where it has one.
+    pub gpu_ms: Option<f64>,
     /// Milliseconds that the whole frame was expected to take by the engine's cost model.
     pub modelled_ms: f64,
     /// Standard deviation of that.

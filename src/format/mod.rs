@@ -10,6 +10,7 @@
 //! ```
 
 pub mod attributes;
+mod breadth_first;
 mod bytes;
 mod encoding;
 mod file_name;

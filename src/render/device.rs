@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{Adapter, DeviceDescriptor, MemoryHints, PollType, Queue, SubmissionIndex};
 
 use super::adapter::{self, AdapterLabel};
+use super::timestamps;
 use crate::{Error, Result};
 
 /// A graphics device and what it was last heard to complain of.
@@ -32,6 +33,7 @@ impl Device {
     fn try_open(adapter: &Adapter) -> Result<Self, wgpu::RequestDeviceError> {
         let (device, queue) = pollster::block_on(adapter.request_device(&DeviceDescriptor {
             label: Some("hlod"),
+            required_features: adapter.features() & timestamps::FEATURES,
             required_limits: adapter.limits(),
             // Nodes come and go all the time; large blocks set aside for them would be memory
             // that no ledger knows of.

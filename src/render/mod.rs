@@ -32,6 +32,8 @@ mod target;
 #[cfg(feature = "render")]
 mod thread_affinity;
 #[cfg(feature = "render")]
+mod timestamps;
+#[cfg(feature = "render")]
 mod warm_up;
 
 #[cfg(feature = "render")]

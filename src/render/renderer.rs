@@ -21,6 +21,7 @@ use super::pipelines::Pipelines;
 use super::samplers::Samplers;
 use super::target::{Layer, Target};
 use super::thread_affinity;
+use super::timestamps::Timestamps;
 use super::warm_up::WarmUp;
 use crate::camera::Pose;
 use crate::{Error, Result};
@@ -32,6 +33,8 @@ pub struct DrawTimes {
     pub encode_ms: f64,
     /// From then until it had done it, milliseconds.
     pub gpu_wait_ms: f64,
+    /// The same by the card's own clock, where it has one.
+    pub gpu_ms: Option<f64>,
     /// Draw calls.
     pub draw_calls: u32,
     /// Triangles, seen or not.
@@ -43,6 +46,7 @@ pub struct Renderer {
     options: RenderOptions,
     device: Device,
     target: Target,
+    timestamps: Option<Timestamps>,
     pipelines: Pipelines,
     samplers: Samplers,
     warm_up: WarmUp,
@@ -110,6 +114,7 @@ impl Renderer {
         Ok(Self {
             options: options.clone(),
             warm_up,
+            timestamps: Timestamps::new(&device),
             device,
             target,
             pipelines,
@@ -244,6 +249,7 @@ impl Renderer {
         Ok(DrawTimes {
             encode_ms: ms(encoded - begin),
             gpu_wait_ms: ms(encoded.elapsed()),
+            gpu_ms: self.timestamps.as_ref().and_then(Timestamps::ms),
             draw_calls: self.jobs.len() as u32,
             triangles,
         })
@@ -305,7 +311,7 @@ impl Renderer {
     }
 
     fn encode(&self, encoder: &mut wgpu::CommandEncoder, over: bool) -> Result<()> {
-        let mut pass = self.target.begin(encoder, over);
+        let mut pass = self.target.begin(encoder, over, self.timestamps.as_ref());
         pass.set_bind_group(0, &self.camera_binding, &[]);
         pass.set_vertex_buffer(1, self.instances.slice(..));
         let (mut pipeline, mut node, mut binding) = (None, None, None);
@@ -336,6 +342,10 @@ impl Renderer {
                 }
             }
             pass.draw_indexed(draw.indices.clone(), 0, slot..slot + 1);
+        }
+        drop(pass);
+        if let Some(timestamps) = &self.timestamps {
+            timestamps.resolve(encoder);
         }
         Ok(())
     }

@@ -8,6 +8,8 @@ use wgpu::{
     TextureFormat, TextureUsages, TextureView,
 };
 
+use super::timestamps::Timestamps;
+
 /// Stores what is seen, encoded; alpha is 1 where a triangle was drawn, else 0.
 pub(super) const COLOR_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 /// Floating point, which reversed depth needs.
@@ -72,7 +74,12 @@ impl Target {
     }
 
     /// Begins to draw on an empty picture, or over what was drawn before, whose depths were kept.
-    pub fn begin<'a>(&self, encoder: &'a mut CommandEncoder, over: bool) -> RenderPass<'a> {
+    pub fn begin<'a>(
+        &self,
+        encoder: &'a mut CommandEncoder,
+        over: bool,
+        timestamps: Option<&Timestamps>,
+    ) -> RenderPass<'a> {
         let color = if over { LoadOp::Load } else { LoadOp::Clear(self.background) };
         let depth = if over { LoadOp::Load } else { LoadOp::Clear(0.0) };
         let store = if self.keep_depths { StoreOp::Store } else { StoreOp::Discard };
@@ -89,6 +96,7 @@ impl Target {
                 depth_ops: Some(Operations { load: depth, store }),
                 stencil_ops: None,
             }),
+            timestamp_writes: timestamps.map(Timestamps::writes),
             ..Default::default()
         })
     }

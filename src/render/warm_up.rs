@@ -34,7 +34,7 @@ impl WarmUp {
     /// Draws nothing, so that a driver which starts threads when it first draws has done so.
     pub fn threads(&self, device: &Device) -> Result<()> {
         let mut encoder = device.device.create_command_encoder(&Default::default());
-        drop(self.target.begin(&mut encoder, false));
+        drop(self.target.begin(&mut encoder, false, None));
         device.wait(device.queue.submit([encoder.finish()]))
     }
 
@@ -50,7 +50,7 @@ impl WarmUp {
         shared: impl Fn(u32) -> Option<&'a GpuPicture>,
     ) -> Result<()> {
         let mut encoder = device.device.create_command_encoder(&Default::default());
-        let mut pass = self.target.begin(&mut encoder, false);
+        let mut pass = self.target.begin(&mut encoder, false, None);
         let mut some = false;
         for draw in &node.draws {
             let picture = match draw.picture {

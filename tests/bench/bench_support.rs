@@ -75,8 +75,9 @@ impl Place {
         self.path().join("out")
     }
 
+    /// The scene, its nodes numbered as in a session.
     pub fn scene(&self) -> Scene {
-        Scene::read(&self.out()).unwrap()
+        Scene::read(&self.out()).unwrap().breadth_first()
     }
 
     /// Runs the program here.

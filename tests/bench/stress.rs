@@ -199,10 +199,10 @@ impl Rig {
 /// Frames in which priorities stay for a while and then jump; what happened.
 fn storm(session: &Session, nodes: Option<u64>, chunk_bytes: u64, seed: u64) -> Counters {
     let mut random = Random::new(seed, 0);
-    let upload_bytes = random.pick(&[0, 20_000, 1 << 22]);
+    let upload_bytes_per_s = random.pick(&[0, 600_000, 1 << 27]);
     let evict_margin = random.pick(&[0.0, 0.1]);
     let options =
-        ResidencyOptions { chunk_bytes, upload_bytes, evict_margin, ..Default::default() };
+        ResidencyOptions { chunk_bytes, upload_bytes_per_s, evict_margin, ..Default::default() };
     let mut rig = Rig::new(session, nodes, options);
     let mut salt = 0;
     for _ in 0..200 {

@@ -99,7 +99,7 @@ impl PoliciesPlan {
         let mut clock = *clock;
         if is_oracle {
             options.residency.max_memory_bytes = u64::MAX / 4;
-            options.residency.upload_bytes = u64::MAX / 4;
+            options.residency.upload_bytes_per_s = u64::MAX / 4;
             clock.load_bytes_per_ms = AT_ONCE;
             clock.prices.uploaded_byte = 0.0;
             clock.cold_byte = 0.0;

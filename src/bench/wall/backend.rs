@@ -148,8 +148,8 @@ impl Backend for GpuBackend<'_> {
 
     fn draw(&mut self, front: &[u32], view: &View) -> Result<Drawn> {
         let begin = Instant::now();
-        self.renderer.draw(front, &view.pose, self.near)?;
-        Ok(Drawn { draw_ms: begin.elapsed().as_secs_f64() * 1e3 })
+        let times = self.renderer.draw(front, &view.pose, self.near)?;
+        Ok(Drawn { draw_ms: begin.elapsed().as_secs_f64() * 1e3, gpu_ms: times.gpu_ms })
     }
 
     fn priorities_set(&mut self) {

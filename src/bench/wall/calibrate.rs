@@ -74,11 +74,11 @@ impl Samples {
     /// Draws nodes; milliseconds that it took.
     fn measure(
         &mut self,
+        tree: &SceneTree,
         measured: &mut MeasurementScene<'_>,
         front: &[u32],
         pose: &Pose,
     ) -> Result<f64> {
-        let (tree, _) = measured.scene();
         let view = View::new(*pose, DVec3::ZERO, measured.renderer().options().size);
         let (first_ms, times) = times(measured.renderer(), front, pose, near_plane(tree))?;
         let ms = percentile(&times, 50.0);
@@ -92,7 +92,7 @@ impl Samples {
     /// The prices that explain the times best; what frames do not tell is as usual.
     fn prices(&self) -> Prices {
         let mut costs = CostModel::new(&ClockConstants::default().prices);
-        self.frames.iter().for_each(|(load, ms)| costs.observe(load, *ms, 0.0));
+        self.frames.iter().for_each(|(load, ms)| costs.observe(load, *ms, None, 0.0));
         costs.prices()
     }
 }
@@ -111,12 +111,12 @@ pub fn measure_start(
         tree.roots().iter().copied().filter(|&root| measured.add(root).is_ok()).collect();
     let mut samples = Samples::default();
     for pose in poses(path) {
-        samples.measure(&mut measured, &[], pose)?;
+        samples.measure(tree, &mut measured, &[], pose)?;
         let seen = seen(tree, &roots, pose, measured.renderer().options().size);
         for part in [seen.len(), seen.len() / 2, seen.len() / 4] {
-            samples.measure(&mut measured, &seen[..part], pose)?;
+            samples.measure(tree, &mut measured, &seen[..part], pose)?;
         }
-        samples.measure(&mut measured, &roots, &far_away(tree, pose))?;
+        samples.measure(tree, &mut measured, &roots, &far_away(tree, pose))?;
     }
     Ok(samples.prices())
 }
@@ -191,7 +191,7 @@ pub fn calibrate(
     let (mut samples, mut stripped, mut pairs) =
         (Samples::default(), Samples::default(), Vec::new());
     for pose in poses(path) {
-        let empty_ms = samples.measure(&mut measured, &[], pose)?;
+        let empty_ms = samples.measure(tree, &mut measured, &[], pose)?;
         for pixels in ERRORS_PIXELS {
             let front = choose(tree, pose, size, pixels)?;
             let nodes = || front.iter().map(|&node| tree.node(node));
@@ -199,11 +199,11 @@ pub fn calibrate(
                 break; // finer ones have more
             }
             measured.show(&front)?;
-            let ms = samples.measure(&mut measured, &front, pose)?;
+            let ms = samples.measure(tree, &mut measured, &front, pose)?;
             // The same triangles without their textures.
             if nodes().any(|node| node.textured_triangles > 0) {
                 measured.strip(&front)?;
-                let without_ms = stripped.measure(&mut measured, &front, pose)?;
+                let without_ms = stripped.measure(tree, &mut measured, &front, pose)?;
                 pairs.push([ms - empty_ms, without_ms - empty_ms]);
             }
         }

@@ -1,25 +1,23 @@
 //! Nodes on the graphics card for measurements, outside of any run.
 
-use std::collections::BTreeSet;
 use std::time::Instant;
 
-use crate::Result;
+use crate::bench::node_cache::NodeCache;
 use crate::loading::{Arrival, NodeFiles};
 use crate::render::Renderer;
-use crate::render::content::{DrawPicture, held_bytes, picture_bytes};
+use crate::render::content::DrawPicture;
 use crate::runtime::SceneTree;
-use crate::runtime::residency::Sizes;
+use crate::{Error, Result};
 
-/// Puts on the graphics card what is to be drawn next, and takes down all of it at the end.
+/// Bytes that stay on the card from one measurement to the next.
+const CAP_BYTES: u64 = 512 << 20;
+
+/// Puts on the graphics card what is to be drawn next, measures what that takes, and takes down all
+/// of it at the end.
 pub struct MeasurementScene<'a> {
-    tree: &'a SceneTree,
-    files: NodeFiles,
-    sizes: Sizes,
-    renderer: &'a mut Renderer,
-    nodes: BTreeSet<u32>,
+    cache: NodeCache<&'a mut Renderer>,
     /// Nodes that are there without their pictures.
-    stripped: BTreeSet<u32>,
-    textures: Vec<bool>,
+    stripped: Vec<u32>,
     /// Bytes of the files that were read.
     read_bytes: u64,
     /// Milliseconds that it took to read and decode them.
@@ -32,18 +30,10 @@ pub struct MeasurementScene<'a> {
 
 impl<'a> MeasurementScene<'a> {
     /// An empty one.
-    pub fn new(tree: &'a SceneTree, files: NodeFiles, renderer: &'a mut Renderer) -> Self {
-        let textures = vec![false; files.scene().shared_textures.len()];
+    pub fn new(tree: &SceneTree, files: NodeFiles, renderer: &'a mut Renderer) -> Self {
         Self {
-            tree,
-            sizes: Sizes::new(files.scene(), held_bytes, |[width, height]| {
-                picture_bytes(width, height)
-            }),
-            files,
-            renderer,
-            nodes: BTreeSet::new(),
-            stripped: BTreeSet::new(),
-            textures,
+            cache: NodeCache::new(tree.clone(), files, renderer, CAP_BYTES),
+            stripped: Vec::new(),
             read_bytes: 0,
             read_ms: 0.0,
             uploaded_bytes: 0,
@@ -53,12 +43,7 @@ impl<'a> MeasurementScene<'a> {
 
     /// What draws.
     pub fn renderer(&mut self) -> &mut Renderer {
-        self.renderer
-    }
-
-    /// The hierarchy and the files of its nodes.
-    pub fn scene(&self) -> (&'a SceneTree, &NodeFiles) {
-        (self.tree, &self.files)
+        self.cache.renderer()
     }
 
     /// Bytes of files that were read and decoded in a millisecond, once any were.
@@ -71,67 +56,60 @@ impl<'a> MeasurementScene<'a> {
         (self.uploaded_bytes, self.upload_ms)
     }
 
-    /// Has exactly these nodes on the card.
+    /// Has these nodes on the card, with their pictures.
     pub fn show(&mut self, front: &[u32]) -> Result<()> {
-        let wanted: BTreeSet<u32> = front.iter().copied().collect();
-        for &node in self.nodes.difference(&wanted).chain(&self.stripped) {
-            self.renderer.remove(node);
+        for node in std::mem::take(&mut self.stripped) {
+            self.cache.let_go(node);
         }
-        self.stripped.clear();
-        let missing: Vec<u32> = wanted.difference(&self.nodes).copied().collect();
-        self.nodes.retain(|node| wanted.contains(node));
-        for node in missing {
+        for node in self.cache.want(front) {
             self.add(node)?;
         }
         let begin = Instant::now();
-        self.renderer.finish_uploads()?;
+        self.cache.renderer().finish_uploads()?;
         self.upload_ms += begin.elapsed().as_secs_f64() * 1e3;
         Ok(())
     }
 
-    /// Has exactly these nodes on the card, none with a picture.
+    /// Has these nodes on the card without their pictures.
     pub fn strip(&mut self, front: &[u32]) -> Result<()> {
         self.show(front)?;
         for &node in front {
-            let mut content = self.read(node)?.content;
-            content.draws.iter_mut().for_each(|draw| draw.picture = DrawPicture::None);
-            self.renderer.upload(node, self.tree.node(node).level, &content)?;
-            self.nodes.remove(&node); // read it again when its pictures are wanted
-            self.stripped.insert(node);
+            let mut arrival = self.read(node)?;
+            arrival.content.draws.iter_mut().for_each(|draw| draw.picture = DrawPicture::None);
+            self.hold(&arrival)?;
+            self.stripped.push(node);
         }
-        self.renderer.finish_uploads()
+        self.cache.renderer().finish_uploads()
     }
 
     /// Reads a node and copies it to the card.
     pub fn add(&mut self, node: u32) -> Result<()> {
         let arrival = self.read(node)?;
         let begin = Instant::now();
-        self.renderer.upload(node, self.tree.node(node).level, &arrival.content)?;
+        self.hold(&arrival)?;
         self.upload_ms += begin.elapsed().as_secs_f64() * 1e3;
-        self.uploaded_bytes += self.sizes.nodes[node as usize].held_bytes;
-        self.nodes.insert(node);
+        self.uploaded_bytes += self.cache.held_bytes(node);
         Ok(())
     }
 
-    /// Reads a node, and copies to the card the shared pictures that come with it.
     fn read(&mut self, node: u32) -> Result<Arrival> {
         let begin = Instant::now();
-        let arrival = self.files.read(node, |texture| self.textures[texture as usize])?;
+        let arrival = self.cache.read_one(node)?;
         self.read_ms += begin.elapsed().as_secs_f64() * 1e3;
-        let scene = self.files.scene();
-        self.read_bytes += scene.nodes[node as usize].file_bytes;
-        for (texture, picture) in &arrival.pictures {
-            self.textures[*texture as usize] = true;
-            self.read_bytes += scene.shared_textures[*texture as usize].bytes;
-            self.renderer.upload_shared(*texture, picture)?;
-        }
+        self.read_bytes += self.cache.file_bytes(&arrival);
         Ok(arrival)
+    }
+
+    fn hold(&mut self, arrival: &Arrival) -> Result<()> {
+        match self.cache.hold(arrival)? {
+            true => Ok(()),
+            false => Err(Error::Internal(format!("node {} lacks a picture", arrival.node))),
+        }
     }
 }
 
 impl Drop for MeasurementScene<'_> {
     fn drop(&mut self) {
-        self.nodes.iter().chain(&self.stripped).for_each(|&node| self.renderer.remove(node));
-        (0..self.textures.len() as u32).for_each(|texture| self.renderer.remove_shared(texture));
+        self.cache.clear();
     }
 }

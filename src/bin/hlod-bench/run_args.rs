@@ -60,9 +60,9 @@ pub struct RunArgs {
     /// Chunk of a file that is read before the most important node is determined again, in bytes
     #[arg(long, value_name = "BYTES", default_value_t = Bytes(RESIDENCY.chunk_bytes), help_heading = "Memory and loading")]
     pub chunk: Bytes,
-    /// Upload limit of a frame in bytes; one node is always uploaded
-    #[arg(long, value_name = "BYTES", default_value_t = Bytes(RESIDENCY.upload_bytes), help_heading = "Memory and loading")]
-    pub upload: Bytes,
+    /// Upload limit in bytes a second; a frame always uploads one node
+    #[arg(long, value_name = "BYTES", default_value_t = Bytes(RESIDENCY.upload_bytes_per_s), help_heading = "Memory and loading")]
+    pub upload_rate: Bytes,
     /// Fraction by which a node's priority must be higher than that of the nodes that are evicted
     /// for it, 0 or more
     #[arg(long, value_name = "PART", default_value_t = RESIDENCY.evict_margin, help_heading = "Memory and loading")]
@@ -183,7 +183,7 @@ impl RunArgs {
             residency: ResidencyOptions {
                 max_memory_bytes: self.max_memory.0,
                 chunk_bytes: self.chunk.0,
-                upload_bytes: self.upload.0,
+                upload_bytes_per_s: self.upload_rate.0,
                 evict_margin: self.evict_margin,
             },
             pace: self.pace,

@@ -21,7 +21,7 @@ impl Residency {
         let missing = self.missing(node, reservations);
         // Memory for more than is uploaded in a frame would lie idle.
         let too_much = !reservations.nodes.is_empty()
-            && reservations.bytes + self.needed_bytes(node) > self.options.upload_bytes;
+            && reservations.bytes + self.needed_bytes(node) > self.upload_bytes;
         if missing > 0 && (too_much || !self.evict(node, missing, reservations)) {
             reservations.tried += 1;
             return false;
@@ -70,7 +70,7 @@ impl Residency {
             }
             at = self.list.before(other);
             let leads = |&for_node: &u32| self.leads_to(other, for_node);
-            if self.recent_priority.of(other) * margin < priority
+            if self.nodes[other as usize].recent.of(self.span) * margin < priority
                 && self.may_leave(other, &victims)
                 && !leads(&node)
                 && !reservations.nodes.iter().any(leads)
@@ -78,7 +78,7 @@ impl Residency {
                 missing = missing.saturating_sub(self.least_freed(other));
                 victims.push(other);
                 // Its parent may leave now, and may have been passed on the way here.
-                if let Some(parent) = self.parents[other as usize]
+                if let Some(parent) = self.nodes[other as usize].parent
                     && self.list.precedes_or_is(other, parent)
                 {
                     at = Some(parent);
@@ -101,7 +101,7 @@ impl Residency {
     /// drew nor visited, and that have no children in memory.
     pub fn release(&mut self, nodes: &[u32]) {
         for &node in nodes {
-            let wanted = [self.visited[node as usize], self.needed[node as usize]];
+            let wanted = [self.nodes[node as usize].visited, self.nodes[node as usize].needed];
             if !wanted.contains(&self.frame) && self.may_leave(node, &[]) {
                 self.leave(node);
             }
@@ -110,7 +110,7 @@ impl Residency {
 
     /// A node's memory is free from the next frame on.
     fn leave(&mut self, node: u32) {
-        self.states[node as usize] = NodeState::Leaving;
+        self.nodes[node as usize].state = NodeState::Leaving;
         self.list.set_loaded(node, false);
         self.resident -= 1;
         self.counters.evictions += 1;
@@ -119,20 +119,20 @@ impl Residency {
 
     /// A load under way that is of less importance than `priority`, or that nobody asks for.
     fn gives_way(&self, other: u32, priority: f64) -> bool {
-        self.visited[other as usize] != self.frame
+        self.nodes[other as usize].visited != self.frame
             || self.list.priority(other) * (1.0 + self.options.evict_margin) < priority
     }
 
     /// Resident, not a root, and without children in memory other than `victims`.
     fn may_leave(&self, node: u32, victims: &[u32]) -> bool {
-        if self.states[node as usize] != NodeState::Resident
-            || self.parents[node as usize].is_none()
+        if self.nodes[node as usize].state != NodeState::Resident
+            || self.nodes[node as usize].parent.is_none()
             || victims.contains(&node)
         {
             return false;
         }
-        let held = self.children_held[node as usize];
-        let leaving = |&&other: &&u32| self.parents[other as usize] == Some(node);
+        let held = self.nodes[node as usize].children_held;
+        let leaving = |&&other: &&u32| self.nodes[other as usize].parent == Some(node);
         held == 0 || held as usize == victims.iter().filter(leaving).count()
     }
 
@@ -140,10 +140,12 @@ impl Residency {
     /// or one of those that are drawn together with an ancestor or not at all. It would come back
     /// as soon as `node` is no longer asked for, and evict again for it, and so on.
     fn leads_to(&self, other: u32, node: u32) -> bool {
-        let above = self.parents[other as usize];
-        let needed = self.needed[other as usize] == self.frame;
-        std::iter::successors(self.parents[node as usize], |&at| self.parents[at as usize])
-            .any(|at| at == other || needed && above == Some(at))
+        let above = self.nodes[other as usize].parent;
+        let needed = self.nodes[other as usize].needed == self.frame;
+        std::iter::successors(self.nodes[node as usize].parent, |&at| {
+            self.nodes[at as usize].parent
+        })
+        .any(|at| at == other || needed && above == Some(at))
     }
 
     /// Bytes that are free for certain once a node is gone; shared pictures may stay.

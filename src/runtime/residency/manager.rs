@@ -3,13 +3,20 @@
 use super::eviction::Reservations;
 use super::memory_budget::MemoryBudget;
 use super::recent_priority::RecentPriority;
-use super::state::{Counters, NodeState, Residency};
+use super::state::{Counters, NodeRecord, NodeState, Residency};
 use super::{PriorityList, ResidencyOptions, Sizes};
 use crate::runtime::SceneTree;
 use crate::{Error, Result};
 
 /// How many nodes are tried, in order of priority, before loading waits for memory.
 const CANDIDATES: usize = 16;
+
+/// Seconds for which a frame makes up at most: one that stalled is not followed by another that
+/// uploads all that has come meanwhile.
+const MOST_FRAME_S: f64 = 0.1;
+
+/// Nodes a second that the last frame did not visit whose priorities are looked at again.
+const STALE_PER_S: f64 = 2_000.0;
 
 /// A chunk to be read: bytes `from..from + bytes` of the node's file followed by those of the
 /// shared pictures that it needs and that are not in memory.
@@ -36,6 +43,18 @@ pub struct Changes {
     pub left_textures: Vec<u32>,
 }
 
+fn record(tree: &SceneTree, sizes: &Sizes, node: u32) -> NodeRecord {
+    NodeRecord {
+        state: NodeState::Absent,
+        parent: tree.node(node).parent,
+        children_held: 0,
+        visited: 0,
+        needed: 0,
+        held_bytes: sizes.nodes[node as usize].held_bytes,
+        recent: RecentPriority::default(),
+    }
+}
+
 impl Residency {
     /// Nothing in memory yet; [`load_root`](Self::load_root) comes next. Fails where the roots
     /// alone do not fit below the cap.
@@ -44,18 +63,16 @@ impl Residency {
         let residency = Self {
             budget: MemoryBudget::new(options.max_memory_bytes, sizes.textures.len()),
             list: PriorityList::new(nodes),
-            states: vec![NodeState::Absent; nodes],
-            parents: (0..nodes as u32).map(|node| tree.node(node).parent).collect(),
-            children_held: vec![0; nodes],
+            nodes: (0..nodes as u32).map(|node| record(tree, &sizes, node)).collect(),
             to_read: vec![0; nodes],
             textures_held: vec![false; sizes.textures.len()],
             loaded_before: vec![false; nodes],
-            visited: vec![0; nodes],
-            recent_priority: RecentPriority::new(nodes),
-            needed: vec![0; nodes],
             frame: 0,
             now_s: 0.0,
+            span: 0,
+            frame_s: 0.0,
             missed: Vec::new(),
+            upload_bytes: 0,
             arrivals: Vec::new(),
             leaving: Vec::new(),
             orphans: Vec::new(),
@@ -111,17 +128,19 @@ impl Residency {
         self.frame += 1;
         self.missed.clear();
         self.requested_bytes = 0;
-        for &(node, _) in visited {
-            self.requested_bytes += self.sizes.nodes[node as usize].held_bytes;
-            self.visited[node as usize] = self.frame;
-            if self.states[node as usize] != NodeState::Resident {
+        self.span = RecentPriority::span(self.now_s);
+        for &(node, priority) in visited {
+            let record = &mut self.nodes[node as usize];
+            self.requested_bytes += record.held_bytes;
+            record.visited = self.frame;
+            record.recent.update(self.span, priority);
+            if record.state != NodeState::Resident {
                 self.missed.push(node);
             }
-            if let Some(parent) = self.parents[node as usize] {
-                self.needed[parent as usize] = self.frame;
+            if let Some(parent) = record.parent {
+                self.nodes[parent as usize].needed = self.frame;
             }
         }
-        self.recent_priority.update(self.now_s, visited);
         self.list.update(visited);
         self.list.update(others);
     }
@@ -131,18 +150,19 @@ impl Residency {
     /// leave, what stands below it and its siblings would no longer be visited.
     pub fn set_needed(&mut self, nodes: impl IntoIterator<Item = u32>) {
         for node in nodes {
-            self.needed[node as usize] = self.frame;
+            self.nodes[node as usize].needed = self.frame;
         }
     }
 
-    /// Nodes in memory that the last frame did not visit, at most `count`, in turn: their
+    /// Nodes in memory that the last frame did not visit, some in each frame, in turn: their
     /// priorities should be looked at from time to time.
-    pub fn stale(&mut self, count: usize, out: &mut Vec<u32>) {
+    pub fn stale(&mut self, out: &mut Vec<u32>) {
         out.clear();
-        for _ in 0..(8 * count).min(self.states.len()) {
-            self.cursor = if self.cursor + 1 < self.states.len() { self.cursor + 1 } else { 0 };
-            let held = self.states[self.cursor] == NodeState::Resident;
-            if held && self.visited[self.cursor] != self.frame {
+        let count = (STALE_PER_S * self.frame_s).ceil() as usize;
+        for _ in 0..(8 * count).min(self.nodes.len()) {
+            self.cursor = if self.cursor + 1 < self.nodes.len() { self.cursor + 1 } else { 0 };
+            let held = self.nodes[self.cursor].state == NodeState::Resident;
+            if held && self.nodes[self.cursor].visited != self.frame {
                 out.push(self.cursor as u32);
             }
             if out.len() == count {
@@ -159,16 +179,16 @@ impl Residency {
         let mut reservations = Reservations::default();
         while let Some(node) = at {
             at = self.list.after(node);
-            let state = self.states[node as usize];
+            let state = self.nodes[node as usize].state;
             match state {
-                NodeState::Absent if self.visited[node as usize] != self.frame => {
+                NodeState::Absent if self.nodes[node as usize].visited != self.frame => {
                     self.list.remove(node); // no longer of interest to anyone
                 }
                 NodeState::Absent if self.wants(node) && self.reserve(node, &mut reservations) => {
                     self.begin(node);
                     return Some(self.chunk(node));
                 }
-                NodeState::Loading { .. } if self.visited[node as usize] == self.frame => {
+                NodeState::Loading { .. } if self.nodes[node as usize].visited == self.frame => {
                     return Some(self.chunk(node));
                 }
                 _ => {}
@@ -182,19 +202,22 @@ impl Residency {
 
     /// Visited in the last frame, not in memory, and the parent is.
     fn wants(&self, node: u32) -> bool {
-        let parent_resident = self.parents[node as usize]
-            .is_some_and(|parent| self.states[parent as usize] == NodeState::Resident);
-        let outside =
-            matches!(self.states[node as usize], NodeState::Absent | NodeState::Loading { .. });
-        outside && parent_resident && self.visited[node as usize] == self.frame
+        let parent_resident = self.nodes[node as usize]
+            .parent
+            .is_some_and(|parent| self.nodes[parent as usize].state == NodeState::Resident);
+        let outside = matches!(
+            self.nodes[node as usize].state,
+            NodeState::Absent | NodeState::Loading { .. }
+        );
+        outside && parent_resident && self.nodes[node as usize].visited == self.frame
     }
 
     fn chunk(&mut self, node: u32) -> Step {
-        let NodeState::Loading { read } = self.states[node as usize] else {
+        let NodeState::Loading { read } = self.nodes[node as usize].state else {
             return Step { node, from: 0, bytes: 0 };
         };
         if let Some(other) = self.current.filter(|&other| other != node) {
-            let suspended = matches!(self.states[other as usize], NodeState::Loading { .. });
+            let suspended = matches!(self.nodes[other as usize].state, NodeState::Loading { .. });
             self.counters.suspensions += u64::from(suspended);
         }
         self.current = Some(node);
@@ -205,7 +228,9 @@ impl Residency {
     /// A chunk was read; true where it was the last, after which [`loaded`](Self::loaded) or
     /// [`broken`](Self::broken) is to be called. False too where the load was given up meanwhile.
     pub fn chunk_read(&mut self, node: u32, bytes: u64) -> bool {
-        let NodeState::Loading { read } = &mut self.states[node as usize] else { return false };
+        let NodeState::Loading { read } = &mut self.nodes[node as usize].state else {
+            return false;
+        };
         *read += bytes;
         self.counters.read_bytes += bytes;
         self.counters.reread_bytes += if self.loaded_before[node as usize] { bytes } else { 0 };
@@ -214,12 +239,12 @@ impl Residency {
 
     /// A node was decoded and waits for drawing to take it.
     pub fn loaded(&mut self, node: u32) {
-        if !matches!(self.states[node as usize], NodeState::Loading { .. }) {
+        if !matches!(self.nodes[node as usize].state, NodeState::Loading { .. }) {
             return;
         }
         self.end_reading(node);
         self.loaded_before[node as usize] = true;
-        self.states[node as usize] = NodeState::Loaded;
+        self.nodes[node as usize].state = NodeState::Loaded;
         for &texture in &self.sizes.nodes[node as usize].textures {
             self.textures_held[texture as usize] = true;
         }
@@ -230,7 +255,7 @@ impl Residency {
 
     /// A node's files cannot be used: it is never asked for again.
     pub fn broken(&mut self, node: u32) {
-        if !matches!(self.states[node as usize], NodeState::Loading { .. }) {
+        if !matches!(self.nodes[node as usize].state, NodeState::Loading { .. }) {
             return;
         }
         self.end_reading(node);
@@ -244,6 +269,8 @@ impl Residency {
     /// frame before began.
     pub fn begin_frame(&mut self, dt_s: f64) -> Changes {
         self.now_s += dt_s.max(0.0);
+        self.frame_s = dt_s.clamp(0.0, MOST_FRAME_S);
+        self.upload_bytes = (self.options.upload_bytes_per_s as f64 * self.frame_s) as u64;
         let mut changes = Changes::default();
         for node in std::mem::take(&mut self.leaving) {
             self.forget(node, NodeState::Absent, &mut changes.left_textures);
@@ -261,14 +288,14 @@ impl Residency {
         let mut taken = 0;
         for &node in &self.arrivals {
             bytes += self.sizes.nodes[node as usize].held_bytes;
-            if taken > 0 && bytes > self.options.upload_bytes && self.frame > 0 {
+            if taken > 0 && bytes > self.upload_bytes && self.frame > 0 {
                 break;
             }
             taken += 1;
         }
         changes.arrived = self.arrivals.drain(..taken).collect();
         for &node in &changes.arrived {
-            self.states[node as usize] = NodeState::Resident;
+            self.nodes[node as usize].state = NodeState::Resident;
             changes.arrived_bytes += self.sizes.nodes[node as usize].held_bytes;
         }
         self.resident += taken;

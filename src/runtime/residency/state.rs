@@ -52,6 +52,24 @@ pub struct Counters {
     pub abandoned: u64,
 }
 
+/// What is looked up of every node that a frame visits: in one place, since nodes that are visited
+/// together lie anywhere in memory.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(super) struct NodeRecord {
+    pub state: NodeState,
+    pub parent: Option<u32>,
+    /// Children that are not absent.
+    pub children_held: u32,
+    /// The frame in which it was visited last.
+    pub visited: u32,
+    /// The last frame in which it was drawn, or its children were visited in its place.
+    pub needed: u32,
+    /// As in [`Sizes`].
+    pub held_bytes: u64,
+    pub recent: RecentPriority,
+}
+
 /// Which nodes are in memory.
 ///
 /// A node is loaded only once its parent is resident, and evicted only once none of its
@@ -63,26 +81,24 @@ pub struct Residency {
     pub(super) sizes: Sizes,
     pub(super) budget: MemoryBudget,
     pub(super) list: PriorityList,
-    pub(super) states: Vec<NodeState>,
-    pub(super) parents: Vec<Option<u32>>,
-    /// By node: children that are not absent.
-    pub(super) children_held: Vec<u32>,
+    pub(super) nodes: Vec<NodeRecord>,
     /// By node: bytes to be read in all, fixed when its load begins.
     pub(super) to_read: Vec<u64>,
     /// By shared picture: whether it is in memory.
     pub(super) textures_held: Vec<bool>,
     /// By node: whether it was ever loaded.
     pub(super) loaded_before: Vec<bool>,
-    /// By node: the frame in which it was visited last.
-    pub(super) visited: Vec<u64>,
-    pub(super) recent_priority: RecentPriority,
-    /// By node: the last frame in which it was drawn, or its children were visited in its place.
-    pub(super) needed: Vec<u64>,
-    pub(super) frame: u64,
+    pub(super) frame: u32,
     /// Seconds since the first frame.
     pub(super) now_s: f64,
+    /// The span at hand in which priorities are remembered.
+    pub(super) span: u32,
+    /// Seconds that the last frame took, as far as uploads and upkeep make up for them.
+    pub(super) frame_s: f64,
     /// Nodes that the last frame visited and that were not resident.
     pub(super) missed: Vec<u32>,
+    /// Bytes that a frame uploads at most, if it takes as long as the last one did.
+    pub(super) upload_bytes: u64,
     /// Loaded, in the order in which they were.
     pub(super) arrivals: Vec<u32>,
     /// Leaving.
@@ -105,7 +121,7 @@ pub struct Residency {
 impl Residency {
     /// Where a node is.
     pub fn state(&self, node: u32) -> NodeState {
-        self.states[node as usize]
+        self.nodes[node as usize].state
     }
 
     /// Bytes that the load of a node reads in all.
@@ -164,10 +180,10 @@ impl Residency {
         let read = self.files(node, &self.textures_held);
         self.to_read[node as usize] = read;
         self.budget.reserve(&self.sizes, node, read);
-        self.states[node as usize] = NodeState::Loading { read: 0 };
+        self.nodes[node as usize].state = NodeState::Loading { read: 0 };
         self.loading.push(node);
-        if let Some(parent) = self.parents[node as usize] {
-            self.children_held[parent as usize] += 1;
+        if let Some(parent) = self.nodes[node as usize].parent {
+            self.nodes[parent as usize].children_held += 1;
         }
     }
 
@@ -180,9 +196,9 @@ impl Residency {
     pub(super) fn forget_load(&mut self, node: u32, state: NodeState) {
         let (held, orphans) = (&self.textures_held, &mut self.orphans);
         self.budget.release_load(&self.sizes, node, held, orphans);
-        self.states[node as usize] = state;
-        if let Some(parent) = self.parents[node as usize] {
-            self.children_held[parent as usize] -= 1;
+        self.nodes[node as usize].state = state;
+        if let Some(parent) = self.nodes[node as usize].parent {
+            self.nodes[parent as usize].children_held -= 1;
         }
     }
 
@@ -194,9 +210,9 @@ impl Residency {
                 gone.push(texture);
             }
         });
-        self.states[node as usize] = state;
-        if let Some(parent) = self.parents[node as usize] {
-            self.children_held[parent as usize] -= 1;
+        self.nodes[node as usize].state = state;
+        if let Some(parent) = self.nodes[node as usize].parent {
+            self.nodes[parent as usize].children_held -= 1;
         }
     }
 }

@@ -242,15 +242,34 @@ fn a_shared_picture_is_held_once_and_leaves_with_its_last_user() {
 }
 
 #[test]
-fn uploads_of_a_frame_are_bounded_but_one_always_comes() {
+fn uploads_of_a_second_are_bounded_but_one_always_comes() {
     let tree = tree(vec![sketch([0.0; 3], 1.0, (0..5).map(|_| leaf()).collect())]);
-    let bounded = ResidencyOptions { upload_bytes: 2 * HELD, ..options(1 << 20) };
-    let mut residency = started(&tree, sizes(6), bounded);
+    let bounded = ResidencyOptions { upload_bytes_per_s: 100 * HELD, ..options(1 << 20) };
+    // Frames of 20 ms have room for two nodes, those of 40 ms for four, and those that stalled
+    // for no more than ten.
+    for (frame_s, expected) in [
+        (0.02, &[&[1, 2][..], &[3, 4], &[5], &[]][..]),
+        (0.04, &[&[1, 2, 3, 4], &[5], &[]]),
+        (1e3, &[&[1, 2, 3, 4, 5], &[]]),
+    ] {
+        let mut residency = started(&tree, sizes(6), bounded);
+        let all = [(0, 9.0), (1, 5.0), (2, 4.0), (3, 3.0), (4, 2.0), (5, 1.0)];
+        residency.set_priorities(&all, &[]);
+        load_all(&mut residency);
+        let frames = 0..expected.len();
+        let arrived: Vec<_> = frames.map(|_| residency.begin_frame(frame_s).arrived).collect();
+        assert_eq!(arrived, expected, "{frame_s} s");
+    }
+    let slow = ResidencyOptions { upload_bytes_per_s: 30 * HELD, ..options(1 << 20) };
+    let mut residency = started(&tree, sizes(6), slow);
     residency.set_priorities(&[(0, 9.0), (1, 5.0), (2, 4.0), (3, 3.0), (4, 2.0), (5, 1.0)], &[]);
     load_all(&mut residency);
-    let arrived: Vec<_> = (0..4).map(|_| residency.begin_frame(FRAME_S).arrived).collect();
-    assert_eq!(arrived, [vec![1, 2], vec![3, 4], vec![5], vec![]]);
-    let tiny = ResidencyOptions { upload_bytes: 1, ..options(1 << 20) };
+    assert_eq!(
+        residency.begin_frame(1e3).arrived,
+        [1, 2, 3],
+        "a stall makes up for a tenth of a second"
+    );
+    let tiny = ResidencyOptions { upload_bytes_per_s: 1, ..options(1 << 20) };
     let mut residency = started(&tree, sizes(6), tiny);
     residency.set_priorities(&[(0, 9.0), (1, 5.0), (2, 4.0)], &[]);
     load_all(&mut residency);
@@ -267,11 +286,16 @@ fn nodes_in_memory_that_nobody_visits_come_up_in_turn() {
     let mut seen = std::collections::BTreeSet::new();
     let mut stale = Vec::new();
     for _ in 0..4 {
-        residency.stale(1, &mut stale);
+        residency.begin_frame(1.0 / 2_000.0);
+        residency.stale(&mut stale);
         assert!(stale.len() <= 1);
         seen.extend(stale.iter().copied());
     }
     assert_eq!(seen.into_iter().collect::<Vec<_>>(), [2, 3, 5, 6]);
+    // More in a longer frame.
+    residency.begin_frame(FRAME_S);
+    residency.stale(&mut stale);
+    assert_eq!(stale.len(), 4);
 }
 
 /// Random priorities, chunks, failures and frames: every promise at every step.
