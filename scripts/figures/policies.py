@@ -1,6 +1,7 @@
 """Runs all policies side by side and writes their figures; see scripts/policies."""
 
 import csv
+import json
 import statistics
 
 from common import DOCS, Options, Programs, machine, real_data, run, say, table, write_between_markers
@@ -10,6 +11,8 @@ PATHS = ["walk", "fly", "rise", "turn"]
 TARGETS = [15, 30, 60]
 # The target of which all figures are told.
 TOLD = 30
+# The paths along which every toggle is drawn.
+POPPED = ["walk", "rise"]
 COLUMNS = [
     ("flip_mean", "FLIP", 4),
     ("flip_p95", "p95", 4),
@@ -45,37 +48,34 @@ def main():
         run([programs.path("hlod-build"), "--quiet", *map(str, models), str(out)])
         folders.append(str(out))
     say("all policies")
-    results = programs.work / "policies-results"
-    run(
-        [
-            programs.path("hlod-bench"),
-            "policies",
-            *folders,
-            "--quiet",
-            "--out",
-            str(results),
-            "--paths",
-            ",".join(PATHS),
-            "--targets",
-            ",".join(map(str, TARGETS)),
-            "--seeds",
-            str(arguments.seeds),
-            "--frames",
-            str(arguments.frames),
-            "--reference-every",
-            str(max(1, arguments.frames // 3)),
-        ]
-    )
-    with open(results / "policies.csv", newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    common = ["--frames", str(arguments.frames)]
+    common += ["--reference-every", str(max(1, arguments.frames // 3))]
+    everywhere = ["--paths", ",".join(PATHS), "--targets", ",".join(map(str, TARGETS))]
+    everywhere += ["--seeds", str(arguments.seeds)]
+    rows, figures = replay(programs, folders, "policies-results", common + everywhere)
+    say("every toggle")
+    popped = ["--paths", ",".join(POPPED), "--targets", str(TOLD), "--seeds", "1", "--pops"]
+    toggled, _ = replay(programs, folders, "policies-pops", common + popped)
     names = [name for name, _ in scenes]
-    parts = [machine(), conditions(arguments), everything(rows), pareto(rows)]
+    parts = [machine(), conditions(arguments), everything(rows), pareto(rows), pairs(figures)]
+    parts.append(pops(toggled))
     parts += [f"`{name}`, target {TOLD} ms:\n\n{by_path(rows, name)}" for name in names]
     parts.append("Toggles a minute by their causes:\n\n" + causes(rows))
     text = "\n\n".join(part.strip("\n") for part in parts) + "\n"
     print(text)
     if arguments.write:
         write_between_markers(DOCS / "policies.md", "policies", text)
+
+
+def replay(programs, folders, name, options):
+    """All runs, and their means with intervals."""
+    results = programs.work / name
+    program = [programs.path("hlod-bench"), "policies", *folders, "--quiet"]
+    run([*program, "--out", str(results), *options])
+    with open(results / "policies.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    with open(results / "policies.json", encoding="utf-8") as file:
+        return rows, json.load(file)
 
 
 def parse():
@@ -96,7 +96,7 @@ def city_options(arguments):
 def conditions(arguments):
     many = "one seed" if arguments.seeds == 1 else f"{arguments.seeds} seeds"
     return (
-        f"{arguments.frames} frames a path after 300 at its first pose, {many} of route, noise (3 %) and "
+        f"{arguments.frames} frames a path after 300 at its first pose, {many} of route, noise (4.5 %) and "
         "stalls (one in 10 s, 15 ms), 1280 × 720, model clock with lavapipe's constants, a cap of "
         "1 GiB. FLIP is against the leaves, of three frames a run. *Late* are frames over the target "
         "by more than a tenth, *longest late* is how long they lasted in a row. *Used* is of the "
@@ -144,6 +144,44 @@ def pareto(rows):
             cells.append(f"{text(flip, 4)} at {text(p95, 1)}")
         body.append([f"`{policy}`", *cells])
     return "FLIP at the 95th percentile of frame times in ms, by target:\n\n" + table(head, body)
+
+
+def pairs(figures):
+    first = figures["first"]
+    head = ["policy", "target, ms", "FLIP", "late, %", "toggles/min", "frame p95, ms"]
+    columns = [
+        ("flip_mean", 4),
+        ("late_percent", 1),
+        ("toggles_per_min", 0),
+        ("frame_ms_p95", 1),
+    ]
+    body = []
+    for at_target in figures["targets"]:
+        for policy, of in at_target["policies"].items():
+            if policy == first:
+                continue
+            cells = []
+            for column, digits in columns:
+                more = of[column]["more_than_first"]
+                cells.append(f"{text(more['mean'], digits)} ± {text(more['half'], digits)}")
+            body.append([f"`{policy}`", f"{at_target['target_ms']:.0f}", *cells])
+    return (
+        f"How much more than `{first}`, mean over pairs of runs along the same path with half of its "
+        "95 % interval:\n\n" + table(head, body)
+    )
+
+
+def pops(rows):
+    head = ["policy", "pops, ΣFLIP", "toggles/min"]
+    body = []
+    for policy in policies(rows):
+        of = at(rows, policy=policy)
+        cells = [text(mean(of, "pop_flip_sum"), 3), text(mean(of, "toggles_per_min"), 0)]
+        body.append([f"`{policy}`", *cells])
+    return (
+        f"The change of the image by every toggle of a run, {' and '.join(POPPED)}, target {TOLD} ms, means "
+        "over scenes:\n\n" + table(head, body)
+    )
 
 
 def by_path(rows, scene):

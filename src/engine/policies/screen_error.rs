@@ -2,7 +2,7 @@
 //!
 //! `screen-error` is what CesiumJS does with 3D Tiles (`Cesium3DTileset`): a threshold of 16
 //! pixels, which grows by 2 % a frame while what is wanted exceeds the memory, and falls back as
-//! fast; what is near the middle of the image, and what a smaller image would need too, is loaded
+//! fast once it is less than half of that; what is near the middle of the image, and what a smaller image would need too, is loaded
 //! first. `screen-error-loop` has no fixed threshold: the load of the frame steers it, as in
 //! NVIDIA's vk_lod_clusters. Rates are by frames of 1/60 s there, and by as much time here.
 
@@ -35,6 +35,9 @@ struct Options {
     pixels: f64,
     /// By how much the threshold grows in a frame while what is wanted exceeds the memory.
     memory_gain: f64,
+    /// The part of the memory below which it falls back (`cacheBytes`, of that and
+    /// `maximumCacheOverflowBytes`).
+    memory_kept: f64,
     /// The part of the field of view around the middle whose nodes are loaded first
     /// (`foveatedConeSize`).
     cone: f64,
@@ -56,6 +59,7 @@ struct Options {
 const OPTIONS: Options = Options {
     pixels: 16.0,
     memory_gain: 1.02,
+    memory_kept: 0.5,
     cone: 0.1,
     progressive: 0.3,
     smoothing: 0.05,
@@ -65,9 +69,10 @@ const OPTIONS: Options = Options {
     down: 0.995,
 };
 
-const PARAMETERS: [Parameter<Options>; 4] = [
+const PARAMETERS: [Parameter<Options>; 5] = [
     parameter!(pixels, 0.1, 1e6, "error that is seen before a node is refined, pixels"),
     parameter!(memory_gain, 1.0, 10.0, "growth of the threshold in 1/60 s while memory is short"),
+    parameter!(memory_kept, 0.0, 1.0, "part of the memory below which the threshold falls back"),
     parameter!(cone, 0.0, 1.0, "part of the field of view that is loaded first"),
     parameter!(progressive, 0.0, 1.0, "part of the image's height that is loaded for first"),
 ];
@@ -141,9 +146,13 @@ impl ScreenError {
 
     fn steer_by_memory(&mut self, frame: &FrameInput<'_>) {
         let gain = Self::rate(self.options.memory_gain, frame.dt_s);
-        let is_short = frame.memory.requested_bytes > frame.memory.cap_bytes;
-        let wanted = if is_short { self.threshold * gain } else { self.threshold / gain };
-        self.threshold = wanted.clamp(self.options.pixels, PIXELS[1]);
+        let (wanted, cap) = (frame.memory.requested_bytes as f64, frame.memory.cap_bytes as f64);
+        if wanted > cap {
+            self.threshold *= gain;
+        } else if wanted < cap * self.options.memory_kept {
+            self.threshold /= gain;
+        }
+        self.threshold = self.threshold.clamp(self.options.pixels, PIXELS[1]);
     }
 }
 
@@ -268,7 +277,10 @@ mod tests {
         frame.memory.requested_bytes = frame.memory.cap_bytes + 1;
         assert!((threshold(&frame) - 16.0 * 1.02).abs() < 1e-9);
         assert!((threshold(&frame) - 16.0 * 1.02 * 1.02).abs() < 1e-9);
-        frame.memory.requested_bytes = 0;
+        // What has room now may have none with a lower threshold.
+        frame.memory.requested_bytes = frame.memory.cap_bytes * 6 / 10;
+        assert!((threshold(&frame) - 16.0 * 1.02 * 1.02).abs() < 1e-9);
+        frame.memory.requested_bytes = frame.memory.cap_bytes * 4 / 10;
         assert!((threshold(&frame) - 16.0 * 1.02).abs() < 1e-9);
         assert!((threshold(&frame) - 16.0).abs() < 1e-9);
         assert_eq!(threshold(&frame), 16.0, "not below");
