@@ -3,8 +3,10 @@
 //! `screen-error` is what CesiumJS does with 3D Tiles (`Cesium3DTileset`): a threshold of 16
 //! pixels, which grows by 2 % a frame while what is wanted exceeds the memory, and falls back as
 //! fast once it is less than half of that; what is near the middle of the image, and what a smaller image would need too, is loaded
-//! first. `screen-error-loop` has no fixed threshold: the load of the frame steers it, as in
-//! NVIDIA's vk_lod_clusters. Rates are by frames of 1/60 s there, and by as much time here.
+//! first. `screen-error-loop` has no fixed threshold: the load of the frame steers it by the rule with
+//! which NVIDIA's vk_lod_clusters (`Renderer::updateLodPixelError`) keeps its streaming memory: there the
+//! load is that of memory, and the threshold never falls below the one set. Rates are by frames of
+//! 1/60 s there, and by as much time here.
 
 use super::descent::descend;
 use super::parameter::{Parameter, info, parameter, with_settings};
