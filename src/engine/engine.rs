@@ -7,6 +7,7 @@ use super::predict::predict;
 use super::{
     Backend, CostModel, FrameEstimate, FrameInput, FrameOutcome, FrameReport, FrontCheck,
     FrontLoad, Inspect, Load, Policy, PredictedView, Residents, Selection, ToggleCauses,
+    Visibility,
 };
 use crate::camera::{Pose, View};
 use crate::runtime::residency::{Changes, Counters, MemoryUse, Residency};
@@ -16,6 +17,7 @@ use crate::{Error, Result};
 /// What policies see, apart from the view.
 struct Seen<'a> {
     tree: &'a SceneTree,
+    visibility: Visibility,
     predicted: Vec<PredictedView>,
     residents: Residents,
     memory: MemoryUse,
@@ -31,6 +33,7 @@ impl Seen<'_> {
         FrameInput {
             tree: self.tree,
             view,
+            visibility: &self.visibility,
             predicted: &self.predicted,
             residents: &self.residents,
             memory: self.memory,
@@ -90,6 +93,7 @@ impl<'a> Engine<'a> {
         Ok(Self {
             seen: Seen {
                 tree,
+                visibility: Visibility::default(),
                 predicted: Vec::new(),
                 residents: Residents::none(tree.len()),
                 memory,
@@ -126,6 +130,7 @@ impl<'a> Engine<'a> {
         report.upload_ms = self.backend.apply(&changes)?;
         let seen = &mut self.seen;
         predict(self.pose.as_ref(), view, seen.dt_s, &mut seen.predicted);
+        seen.visibility.begin_frame(seen.tree.len());
         seen.budget_ms = self.margin.budget_ms(seen.target_ms);
 
         let before = self.backend.now_ms();

@@ -21,6 +21,7 @@ mod residents;
 #[cfg(test)]
 pub(crate) mod test_frame;
 mod toggle_causes;
+mod visibility;
 
 pub use backend::{Backend, Drawn, Inspect};
 pub use check_front::{FrontCheck, FrontFault, FrontRule};
@@ -31,3 +32,4 @@ pub use policy::{FrameEstimate, FrameInput, FrameOutcome, Policy, PredictedView,
 pub use report::FrameReport;
 pub use residents::Residents;
 pub use toggle_causes::ToggleCauses;
+pub use visibility::Visibility;

@@ -1,6 +1,6 @@
 //! The boundary at which ways of choosing levels of detail differ.
 
-use super::{CostModel, Residents};
+use super::{CostModel, Residents, Visibility};
 use crate::camera::View;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::MemoryUse;
@@ -12,6 +12,8 @@ pub struct FrameInput<'a> {
     pub tree: &'a SceneTree,
     /// The camera.
     pub view: &'a View,
+    /// What was found so far of what it has in view: asked for by [`is_visible`](Self::is_visible).
+    pub visibility: &'a Visibility,
     /// Where the camera is expected to be soon, if it goes on as it does; nearest in time first.
     pub predicted: &'a [PredictedView],
     /// Which nodes can be drawn now, and which are on their way.
@@ -42,7 +44,8 @@ pub struct PredictedView {
 impl FrameInput<'_> {
     /// Whether a node may be in view, as far as its box tells.
     pub fn is_visible(&self, node: u32) -> bool {
-        self.view.frustum.outside(self.tree.node(node).bbox) <= 0.0
+        let find = || self.view.frustum.outside(self.tree.node(node).bbox) <= 0.0;
+        self.visibility.get_or(node, find)
     }
 
     /// Whether the children of a node can be drawn in its place: it has some, and all of them that

@@ -1,6 +1,6 @@
 //! What policies see, for their tests.
 
-use super::{CostModel, FrameInput, Policy, Prices, Residents, Selection};
+use super::{CostModel, FrameInput, Policy, Prices, Residents, Selection, Visibility};
 use crate::camera::View;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::MemoryUse;
@@ -10,6 +10,8 @@ use crate::runtime::test_tree::view;
 pub(crate) struct TestFrame {
     pub tree: SceneTree,
     pub view: View,
+    /// Remembers nothing.
+    pub visibility: Visibility,
     pub residents: Residents,
     pub costs: CostModel,
     pub memory: MemoryUse,
@@ -37,6 +39,7 @@ impl TestFrame {
             residents: Residents::all(tree.len()),
             tree,
             view: view(),
+            visibility: Visibility::default(),
             costs: CostModel::new(&triangles_alone(1.0)),
             memory: MemoryUse { cap_bytes: 1 << 30, used_bytes: 0, requested_bytes: 0 },
             target_ms: 10.0,
@@ -48,6 +51,7 @@ impl TestFrame {
         FrameInput {
             tree: &self.tree,
             view: &self.view,
+            visibility: &self.visibility,
             predicted: &[],
             residents: &self.residents,
             memory: self.memory,

@@ -13,7 +13,9 @@ use crate::bench::model_load::TileLoad;
 use crate::bench::statistics::{deviation, percentile};
 use crate::camera::{CameraPath, Pose, View};
 use crate::engine::policies::{PolicyKind, Settings};
-use crate::engine::{CostModel, FrameInput, FrontLoad, Load, Prices, Residents, Selection};
+use crate::engine::{
+    CostModel, FrameInput, FrontLoad, Load, Prices, Residents, Selection, Visibility,
+};
 use crate::loading::NodeFiles;
 use crate::render::Renderer;
 use crate::runtime::SceneTree;
@@ -149,6 +151,7 @@ fn choose(tree: &SceneTree, pose: &Pose, size: [u32; 2], pixels: f64) -> Result<
     let frame = FrameInput {
         tree,
         view: &View::new(*pose, DVec3::ZERO, size),
+        visibility: &Visibility::default(),
         predicted: &[],
         residents: &Residents::all(tree.len()),
         memory: MemoryUse { cap_bytes: u64::MAX, ..MemoryUse::default() },
