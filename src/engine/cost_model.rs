@@ -33,11 +33,6 @@ const LEAST_MS: f64 = 1e-6;
 /// A frame later than this after the one before forgets no more.
 const LONGEST_S: f64 = 1.0;
 
-/// Choices go by the prices of a while ago, until the sum of a frame by those of now is another by more
-/// than this part: where a node's price and the budget are nearly the same, every frame's noise would
-/// decide anew.
-const STEADY: f64 = 0.01;
-
 /// How many frames of an ordinary load the prices at the start are worth.
 const PRIOR_FRAMES: f64 = 0.2;
 
@@ -162,8 +157,6 @@ pub struct CostModel {
     prices: [f64; TERMS],
     expected: [f64; TERMS],
     prior: f64,
-    /// Of card and processor together, those by which levels are chosen.
-    steady: [f64; TERMS],
     frames: LeastSquares<TERMS>,
     /// Once the time of the graphics card is known.
     host: Option<HostTime>,
@@ -181,16 +174,7 @@ impl CostModel {
         // As frames weigh in which each term is ordinary.
         let prior = if whole > 0.0 { PRIOR_FRAMES / (whole * whole) } else { PRIOR_FRAMES };
         let frames = LeastSquares::new(expected, prior);
-        Self {
-            prices: expected,
-            expected,
-            prior,
-            steady: expected,
-            frames,
-            host: None,
-            drift: 0.0,
-            errors: [0.0; 3],
-        }
+        Self { prices: expected, expected, prior, frames, host: None, drift: 0.0, errors: [0.0; 3] }
     }
 
     /// What things take, as far as is known.
@@ -209,7 +193,7 @@ impl CostModel {
 
     /// What the next frame should take.
     pub fn estimate(&self, load: &Load) -> Estimate {
-        let mean_ms = dot(&self.sums(), &load.terms()) * libm::exp(self.drift);
+        let mean_ms = self.priced_ms(load) * libm::exp(self.drift);
         Estimate { mean_ms, deviation_ms: self.relative_deviation() * mean_ms }
     }
 
@@ -223,12 +207,12 @@ impl CostModel {
     /// [`estimate`](Self::estimate), which follows each frame's noise a little, levels toggle two to four
     /// times as often.
     pub fn priced_ms(&self, load: &Load) -> f64 {
-        dot(&self.steady, &load.terms())
+        dot(&self.sums(), &load.terms())
     }
 
     /// Milliseconds of that which a load adds to a frame that is drawn anyway.
     pub fn added_ms(&self, load: &Load) -> f64 {
-        self.priced_ms(load) - self.steady[0]
+        self.priced_ms(load) - self.sums()[0]
     }
 
     /// Mean of (estimated − actual) / actual over the frames of late.
@@ -261,11 +245,7 @@ impl CostModel {
         // Relative errors count: a frame of 100 ms must not outweigh a hundred of 10.
         let weight = 1.0 / (actual_ms * actual_ms);
         self.learn(terms, actual_ms, gpu_ms, weight, kept);
-        let priced_ms = dot(&self.sums(), &terms).max(LEAST_MS);
-        if (dot(&self.steady, &terms) / priced_ms - 1.0).abs() > STEADY {
-            self.steady = self.sums();
-        }
-        let unexplained = libm::log(actual_ms / priced_ms);
+        let unexplained = libm::log(actual_ms / dot(&self.sums(), &terms).max(LEAST_MS));
         let more = (unexplained - self.drift).clamp(-MOST_DRIFT, MOST_DRIFT);
         self.drift += (1.0 - libm::exp2(-dt_s / DRIFT_HALF_LIFE_S)) * more;
     }

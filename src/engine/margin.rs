@@ -11,10 +11,6 @@ const MOST_FRAMES: usize = 600;
 /// The part of frames that are to keep to the target.
 const KEPT: f64 = 0.95;
 
-/// The ratio that budgets go by is followed in steps of this part: a quantile of noise is noise too,
-/// and levels would toggle with it.
-const STEADY: f64 = 0.02;
-
 /// However wrong estimates were, budgets stay within this of the target.
 const RANGE: [f64; 2] = [0.5, 2.0];
 
@@ -30,8 +26,6 @@ pub struct Margin {
     /// When frames were drawn, and what they took over what was expected.
     ratios: VecDeque<(f64, f64)>,
     now_s: f64,
-    /// That of the last budget; `None` before any.
-    steady: Option<f64>,
     sorted: Vec<f64>,
 }
 
@@ -43,9 +37,7 @@ impl Margin {
         let above = (self.sorted.len() as f64 * (1.0 - KEPT)) as usize;
         let Some(rank) = self.sorted.len().checked_sub(1 + above) else { return target_ms };
         let (_, &mut ratio, _) = self.sorted.select_nth_unstable_by(rank, f64::total_cmp);
-        let ratio = ratio.clamp(RANGE[0], RANGE[1]);
-        let is_near = |steady: &f64| (ratio / steady - 1.0).abs() <= STEADY;
-        target_ms / *self.steady.insert(self.steady.filter(is_near).unwrap_or(ratio))
+        target_ms / ratio.clamp(RANGE[0], RANGE[1])
     }
 
     /// A frame, `dt_s` seconds after the one before, took `actual_ms`. What is no number or took
