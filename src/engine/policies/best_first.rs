@@ -3,9 +3,9 @@
 //!
 //! As the splat budget of PlayCanvas 2.22 does it (`gsplat-budget-balancer.js`), which starts anew in
 //! each frame; later versions choose by distance. Options are what streamers of splats do beside it, at
-//! 1/60 s a frame: a node that was refined or had its level changed is not refined for 10 frames
-//! (Babylon.js; its budget goes before that, so that levels fall at once), and what nobody asked for
-//! in 100 frames leaves memory (PlayCanvas and Babylon.js).
+//! 1/60 s a frame: a node keeps a new level for 10 frames (Babylon.js; its budget goes before that, so
+//! that levels fall at once), and what nobody asked for in 100 frames leaves memory (PlayCanvas and
+//! Babylon.js).
 //!
 //! Ours are: the error that is removed counts in pixels rather than in the units of the scene (over
 //! walks, flights and rises of five scenes, FLIP is 2.7 % less by that); only what is in view takes part;

@@ -2,11 +2,15 @@
 //!
 //! `screen-error` is what CesiumJS does with 3D Tiles (`Cesium3DTileset`): a threshold of 16
 //! pixels, which grows by 2 % a frame while what is wanted exceeds the memory, and falls back as
-//! fast once it is less than half of that; what is near the middle of the image, and what a smaller image would need too, is loaded
-//! first. `screen-error-loop` has no fixed threshold: the load of the frame steers it by the rule with
-//! which NVIDIA's vk_lod_clusters (`Renderer::updateLodPixelError`) keeps its streaming memory: there the
-//! load is that of memory, and the threshold never falls below the one set. Rates are by frames of
-//! 1/60 s there, and by as much time here.
+//! fast once it is less than half of that; what is near the middle of the image, and what a smaller
+//! image would need too, is loaded first. The last is as its documentation has it: its source defers
+//! nothing in tilesets that replace tiles and skip no level, as ours do, and loads there what a smaller
+//! image would need, then what is near the line of sight, then what is near the camera.
+//!
+//! `screen-error-loop` has no fixed threshold: the load of the frame steers it by the rule with which
+//! NVIDIA's vk_lod_clusters keeps its streaming memory (commit c19a250, read in a program that has taken
+//! it over): there the load is that of memory, and the threshold never falls below the one set. Rates
+//! are by frames of 1/60 s there, and by as much time here.
 
 use super::descent::descend;
 use super::parameter::{Parameter, info, parameter, with_settings};

@@ -101,7 +101,8 @@ impl Residency {
     /// drew nor visited, and that have no children in memory.
     pub fn release(&mut self, nodes: &[u32]) {
         for &node in nodes {
-            let wanted = [self.nodes[node as usize].visited, self.nodes[node as usize].needed];
+            let record = &self.nodes[node as usize];
+            let wanted = [record.visited, record.needed];
             if !wanted.contains(&self.frame) && self.may_leave(node, &[]) {
                 self.leave(node);
             }
@@ -125,13 +126,12 @@ impl Residency {
 
     /// Resident, not a root, and without children in memory other than `victims`.
     fn may_leave(&self, node: u32, victims: &[u32]) -> bool {
-        if self.nodes[node as usize].state != NodeState::Resident
-            || self.nodes[node as usize].parent.is_none()
-            || victims.contains(&node)
+        let record = &self.nodes[node as usize];
+        if record.state != NodeState::Resident || record.parent.is_none() || victims.contains(&node)
         {
             return false;
         }
-        let held = self.nodes[node as usize].children_held;
+        let held = record.children_held;
         let leaving = |&&other: &&u32| self.nodes[other as usize].parent == Some(node);
         held == 0 || held as usize == victims.iter().filter(leaving).count()
     }

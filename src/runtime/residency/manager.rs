@@ -202,14 +202,10 @@ impl Residency {
 
     /// Visited in the last frame, not in memory, and the parent is.
     fn wants(&self, node: u32) -> bool {
-        let parent_resident = self.nodes[node as usize]
-            .parent
-            .is_some_and(|parent| self.nodes[parent as usize].state == NodeState::Resident);
-        let outside = matches!(
-            self.nodes[node as usize].state,
-            NodeState::Absent | NodeState::Loading { .. }
-        );
-        outside && parent_resident && self.nodes[node as usize].visited == self.frame
+        let record = &self.nodes[node as usize];
+        let is_resident = |parent: u32| self.nodes[parent as usize].state == NodeState::Resident;
+        let outside = matches!(record.state, NodeState::Absent | NodeState::Loading { .. });
+        outside && record.visited == self.frame && record.parent.is_some_and(is_resident)
     }
 
     fn chunk(&mut self, node: u32) -> Step {
