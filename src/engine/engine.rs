@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use super::margin::Margin;
 use super::predict::predict;
+use super::steady::Steady;
 use super::{
     Backend, CostModel, FrameEstimate, FrameInput, FrameOutcome, FrameReport, FrontCheck,
     FrontLoad, Inspect, Load, Policy, PredictedView, Residents, Selection, ToggleCauses,
@@ -21,9 +22,8 @@ struct Seen<'a> {
     predicted: Vec<PredictedView>,
     residents: Residents,
     memory: MemoryUse,
-    costs: CostModel,
+    steady: Steady,
     target_ms: f64,
-    budget_ms: f64,
     /// Seconds since the frame before began.
     dt_s: f64,
 }
@@ -37,9 +37,9 @@ impl Seen<'_> {
             predicted: &self.predicted,
             residents: &self.residents,
             memory: self.memory,
-            costs: &self.costs,
+            costs: self.steady.costs(),
             target_ms: self.target_ms,
-            budget_ms: self.budget_ms,
+            budget_ms: self.steady.budget_ms(self.target_ms),
             dt_s: self.dt_s,
         }
     }
@@ -51,8 +51,11 @@ pub struct Engine<'a> {
     policy: &'a mut dyn Policy,
     residency: Arc<Mutex<Residency>>,
     backend: &'a mut dyn Backend,
+    costs: CostModel,
     margin: Margin,
     front_load: FrontLoad,
+    /// What the frame before drew.
+    drawn: Load,
     /// The camera of the frame before.
     pose: Option<Pose>,
     selection: Selection,
@@ -97,16 +100,17 @@ impl<'a> Engine<'a> {
                 predicted: Vec::new(),
                 residents: Residents::none(tree.len()),
                 memory,
-                costs,
+                steady: Steady::new(&costs),
                 target_ms,
-                budget_ms: target_ms,
                 dt_s: 0.0,
             },
             policy,
             residency,
             backend,
+            costs,
             margin: Margin::default(),
             front_load: FrontLoad::default(),
+            drawn: Load::default(),
             pose: None,
             selection: Selection::default(),
             before: Vec::new(),
@@ -131,7 +135,8 @@ impl<'a> Engine<'a> {
         let seen = &mut self.seen;
         predict(self.pose.as_ref(), view, seen.dt_s, &mut seen.predicted);
         seen.visibility.begin_frame(seen.tree.len());
-        seen.budget_ms = self.margin.budget_ms(seen.target_ms);
+        let is_still = changes.arrived.is_empty() && self.pose == Some(view.pose);
+        seen.steady.follow(&self.costs, self.margin.ratio(), &self.drawn, is_still);
 
         let before = self.backend.now_ms();
         self.policy.select(&self.seen.from(view), &mut self.selection);
@@ -181,7 +186,7 @@ impl<'a> Engine<'a> {
     /// Sets what was expected of a frame beside what it took, and learns from it.
     fn estimate(&mut self, view: &View, changes: &Changes, report: &mut FrameReport) {
         let front = &self.selection.front;
-        let Seen { tree, costs, dt_s, .. } = &mut self.seen;
+        let (costs, &Seen { tree, dt_s, .. }) = (&mut self.costs, &self.seen);
         let whole = self.front_load.of(tree, front, view, changes.arrived_bytes);
         let drawn = Load { uploaded_bytes: 0.0, ..whole };
         let modelled = costs.estimate(&whole);
@@ -193,8 +198,9 @@ impl<'a> Engine<'a> {
         });
         report.estimated_ms = estimate.ms;
         report.estimated_without_feedback_ms = estimate.without_feedback_ms;
-        self.margin.observe(costs.priced_ms(&drawn), report.frame_ms, *dt_s);
-        costs.observe(&whole, report.frame_ms, report.gpu_ms, *dt_s);
+        self.margin.observe(costs.priced_ms(&drawn), report.frame_ms, dt_s);
+        costs.observe(&whole, report.frame_ms, report.gpu_ms, dt_s);
+        self.drawn = drawn;
     }
 
     /// Nodes that the last frame drew.

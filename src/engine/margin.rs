@@ -30,14 +30,14 @@ pub struct Margin {
 }
 
 impl Margin {
-    /// Milliseconds that a frame may be expected to take, so that it keeps to its target.
-    pub fn budget_ms(&mut self, target_ms: f64) -> f64 {
+    /// How many times longer than expected 19 of 20 frames take at most; 1 before any.
+    pub fn ratio(&mut self) -> f64 {
         self.sorted.clear();
         self.sorted.extend(self.ratios.iter().map(|&(_, ratio)| ratio));
         let above = (self.sorted.len() as f64 * (1.0 - KEPT)) as usize;
-        let Some(rank) = self.sorted.len().checked_sub(1 + above) else { return target_ms };
+        let Some(rank) = self.sorted.len().checked_sub(1 + above) else { return 1.0 };
         let (_, &mut ratio, _) = self.sorted.select_nth_unstable_by(rank, f64::total_cmp);
-        target_ms / ratio.clamp(RANGE[0], RANGE[1])
+        ratio.clamp(RANGE[0], RANGE[1])
     }
 
     /// A frame, `dt_s` seconds after the one before, took `actual_ms`. What is no number or took
@@ -65,7 +65,7 @@ mod tests {
 
     #[test]
     fn before_any_frame_the_whole_target_is_to_spend() {
-        assert_eq!(Margin::default().budget_ms(30.0), 30.0);
+        assert_eq!(Margin::default().ratio(), 1.0);
     }
 
     #[test]
@@ -75,7 +75,7 @@ mod tests {
             let (mut margin, mut random) = (Margin::default(), Random::new(1, 0));
             let mut over = 0;
             for frame in 0..3300 {
-                let budget_ms = margin.budget_ms(30.0);
+                let budget_ms = 30.0 / margin.ratio();
                 let tail = -libm::log(1.0 - random.unit());
                 let actual_ms = budget_ms * bias * (1.0 + noise * tail);
                 over += u32::from(frame >= 300 && actual_ms > 30.0 * (1.0 + 1e-9));
@@ -92,13 +92,13 @@ mod tests {
         let mut margin = Margin::default();
         let mut observe = |ratio: f64, frames: usize| {
             (0..frames).for_each(|_| margin.observe(10.0, 10.0 * ratio, FRAME_S));
-            margin.budget_ms(30.0)
+            margin.ratio()
         };
         observe(1.0, 300);
-        assert_eq!(observe(100.0, 1), 30.0);
-        assert_eq!(observe(1.25, 20), 24.0);
-        assert_eq!(observe(1.0, 301), 30.0, "forgotten");
-        assert_eq!(observe(1e3, 100), 15.0, "never less than half");
+        assert_eq!(observe(100.0, 1), 1.0);
+        assert_eq!(observe(1.25, 20), 1.25);
+        assert_eq!(observe(1.0, 301), 1.0, "forgotten");
+        assert_eq!(observe(1e3, 100), 2.0, "budgets are never less than half");
     }
 
     #[test]
@@ -108,6 +108,6 @@ mod tests {
             margin.observe(odd, 1.0, odd);
             margin.observe(1.0, odd, odd);
         }
-        assert_eq!(margin.budget_ms(30.0), 30.0);
+        assert_eq!(margin.ratio(), 1.0);
     }
 }

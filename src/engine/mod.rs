@@ -18,6 +18,7 @@ mod policy;
 mod predict;
 mod report;
 mod residents;
+mod steady;
 #[cfg(test)]
 pub(crate) mod test_frame;
 mod toggle_causes;

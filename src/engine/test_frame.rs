@@ -1,5 +1,6 @@
 //! What policies see, for their tests.
 
+use super::policies::{PolicyKind, Settings};
 use super::{CostModel, FrameInput, Policy, Prices, Residents, Selection, Visibility};
 use crate::camera::View;
 use crate::runtime::SceneTree;
@@ -74,4 +75,13 @@ impl TestFrame {
         front.sort_unstable();
         front
     }
+}
+
+/// Settings by which a policy's counters go from one end to the other within a minute rather than
+/// many.
+pub(crate) fn quick(kind: PolicyKind) -> Settings {
+    let counters = [("hyst_switch", 50.0), ("hyst_limit", 150.0)];
+    let mut settings = Settings::from(counters.map(|(name, value)| (name.into(), value)));
+    settings.retain(|name, _| kind.parameters().iter().any(|known| known.name == name));
+    settings
 }

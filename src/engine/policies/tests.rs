@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{POLICIES, PolicyKind, Settings};
 use crate::camera::{View, from_angles};
-use crate::engine::test_frame::TestFrame;
+use crate::engine::test_frame::{TestFrame, quick};
 use crate::engine::{FrameOutcome, FrontCheck, Policy, Prices, Selection};
 use crate::mesh::UpAxis;
 use crate::random::Random;
@@ -146,11 +146,7 @@ fn a_still_camera_converges_and_then_toggles_nothing() {
             let mut frame = TestFrame::new(random_tree(&mut random));
             frame.costs = crate::engine::CostModel::new(&prices());
             frame.view = random_view(&mut random);
-            // Within minutes rather than hours.
-            let quick = [("hyst_switch", 50.0), ("hyst_limit", 150.0)].map(|(n, v)| (n.into(), v));
-            let mut settings = Settings::from(quick);
-            settings.retain(|name, _| kind.parameters().iter().any(|known| known.name == name));
-            let mut policy = kind.make(&settings).unwrap();
+            let mut policy = kind.make(&quick(kind)).unwrap();
             let mut fronts = Vec::new();
             let mut loads = crate::engine::FrontLoad::default();
             for _ in 0..6000 {
