@@ -20,7 +20,8 @@ pub struct FrameInput<'a> {
     pub residents: &'a Residents,
     /// The memory cap, and what is in use.
     pub memory: MemoryUse,
-    /// What frames take, as learned from those drawn so far.
+    /// What frames take, as learned from those drawn so far; the same as in the frame before while only
+    /// noise has changed it.
     pub costs: &'a CostModel,
     /// Milliseconds that the frame may take.
     pub target_ms: f64,
