@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use super::{BenchOptions, FrameInspector, FrameRecord, FrameSample, Pace};
 use crate::Result;
 use crate::camera::{CameraPath, View};
-use crate::engine::{Backend, CostModel, Engine, Policy};
+use crate::engine::{Backend, CostModel, Engine, Occluders, Policy};
 use crate::runtime::SceneTree;
 use crate::runtime::residency::Residency;
 
@@ -23,6 +23,8 @@ pub struct Replay<'a> {
     pub backend: &'a mut dyn Backend,
     /// What frames are expected to take at first.
     pub costs: CostModel,
+    /// What hides what, where that is to be known.
+    pub occluders: Option<Arc<Occluders>>,
     /// Who inspects its frames, or nobody.
     pub inspector: Option<&'a mut dyn FrameInspector>,
     /// What else determines it.
@@ -43,8 +45,12 @@ pub struct Run {
 /// Replays a path; `progress` is told of each frame that is done and ends the run where it says
 /// false.
 pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -> Result<Run> {
-    let Replay { tree, path, policy, residency, backend, costs, mut inspector, options } = replay;
+    let Replay { tree, path, policy, residency, backend, costs, occluders, mut inspector, options } =
+        replay;
     let mut engine = Engine::start(tree, policy, residency, backend, costs, options.target_ms)?;
+    if let Some(occluders) = occluders {
+        engine.look_past(occluders);
+    }
     let view =
         |index: usize| View::new(path.frames[index].pose, path.velocity(index), options.size.0);
     let interval_s = |index: usize| match options.pace {

@@ -1,7 +1,7 @@
 //! A built scene that is open for runs.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use super::{
     BenchOptions, ClockConstants, Context, FrameInspector, FrameRecord, ModelBackend, Replay, Run,
@@ -9,7 +9,7 @@ use super::{
 };
 use crate::Result;
 use crate::camera::CameraPath;
-use crate::engine::{CostModel, Policy};
+use crate::engine::{CostModel, Occluders, Policy};
 use crate::format::Scene;
 use crate::loading::NodeFiles;
 use crate::render::content::{held_bytes, picture_bytes};
@@ -22,6 +22,8 @@ pub struct Session {
     dir: PathBuf,
     scene: Arc<Scene>,
     tree: SceneTree,
+    /// Read where a policy first asks for it.
+    occluders: OnceLock<Arc<Occluders>>,
 }
 
 impl Session {
@@ -29,7 +31,7 @@ impl Session {
     pub fn open(dir: &Path) -> Result<Self> {
         let scene = Arc::new(Scene::read(dir)?.breadth_first());
         let tree = SceneTree::new(&scene);
-        Ok(Self { dir: dir.to_owned(), scene, tree })
+        Ok(Self { dir: dir.to_owned(), scene, tree, occluders: OnceLock::new() })
     }
 
     /// The scene.
@@ -56,6 +58,21 @@ impl Session {
         let sizes =
             Sizes::new(&self.scene, held_bytes, |[width, height]| picture_bytes(width, height));
         Ok(Arc::new(Mutex::new(Residency::new(&self.tree, sizes, options.residency)?)))
+    }
+
+    /// The surfaces of the roots, for policies that ask what hides what. A file that cannot be used
+    /// hides nothing; the run tells of it.
+    fn occluders(&self, policy: &dyn Policy) -> Option<Arc<Occluders>> {
+        let read = || {
+            let mut occluders = Occluders::default();
+            for &root in self.tree.roots() {
+                if let Ok(mesh) = self.files().read_mesh(root) {
+                    occluders.add(self.tree.node(root).bbox, &mesh);
+                }
+            }
+            Arc::new(occluders)
+        };
+        policy.wants_seen_areas().then(|| Arc::clone(self.occluders.get_or_init(read)))
     }
 
     fn context(&self, options: BenchOptions, path: &CameraPath, policy: &dyn Policy) -> Context {
@@ -90,6 +107,7 @@ impl Session {
         let mut policy = options.policy.make()?;
         let tree = self.tree_for(&constants);
         let context = Context { constants, ..self.context(options.clone(), path, &*policy) };
+        let occluders = self.occluders(&*policy);
         let mut backend = ModelBackend::new(&tree, constants, options.seed);
         let replay = Replay {
             tree: &tree,
@@ -98,6 +116,7 @@ impl Session {
             residency: self.residency(&options)?,
             backend: &mut backend,
             costs: CostModel::new(&constants.prices),
+            occluders,
             inspector: match inspector {
                 Some(inspector) => Some(inspector), // for as long as this run
                 None => None,
@@ -143,6 +162,7 @@ impl Session {
             adapter: Some(adapter),
             ..self.context(options.clone(), path, &*policy)
         };
+        let occluders = self.occluders(&*policy);
         let mut backend = super::GpuBackend::new(
             &tree,
             self.files(),
@@ -157,6 +177,7 @@ impl Session {
             residency,
             backend: &mut backend,
             costs: CostModel::new(&constants.prices),
+            occluders,
             inspector: match inspector {
                 Some(inspector) => Some(inspector), // for as long as this run
                 None => None,

@@ -41,6 +41,11 @@ impl Frustum {
         }
     }
 
+    /// What a metre to the right, and a metre up, at a depth of 1 m is of half the picture.
+    pub fn across(&self) -> [DVec3; 2] {
+        self.across
+    }
+
     /// Metres by which a box is outside of the pyramid: 0 where it may be seen, otherwise the
     /// greatest distance by which the whole of it is beyond one side. Never says that a visible
     /// box is outside; near the edges it may call an invisible one visible.

@@ -7,8 +7,8 @@ use super::predict::predict;
 use super::steady::Steady;
 use super::{
     Backend, CostModel, FrameEstimate, FrameInput, FrameOutcome, FrameReport, FrontCheck,
-    FrontLoad, Inspect, Load, Policy, PredictedView, Residents, Selection, ToggleCauses,
-    Visibility,
+    FrontLoad, Inspect, Load, Occluders, Policy, PredictedView, Residents, SeenAreas, Selection,
+    ToggleCauses, Visibility,
 };
 use crate::camera::{Pose, View};
 use crate::runtime::residency::{Changes, Counters, MemoryUse, Residency};
@@ -19,6 +19,7 @@ use crate::{Error, Result};
 struct Seen<'a> {
     tree: &'a SceneTree,
     visibility: Visibility,
+    seen: Option<SeenAreas>,
     predicted: Vec<PredictedView>,
     residents: Residents,
     memory: MemoryUse,
@@ -34,6 +35,7 @@ impl Seen<'_> {
             tree: self.tree,
             view,
             visibility: &self.visibility,
+            seen: self.seen.as_ref(),
             predicted: &self.predicted,
             residents: &self.residents,
             memory: self.memory,
@@ -97,6 +99,7 @@ impl<'a> Engine<'a> {
             seen: Seen {
                 tree,
                 visibility: Visibility::default(),
+                seen: None,
                 predicted: Vec::new(),
                 residents: Residents::none(tree.len()),
                 memory,
@@ -125,6 +128,13 @@ impl<'a> Engine<'a> {
         })
     }
 
+    /// Finds out how much of nodes is seen past these, where the policy asks for it.
+    pub fn look_past(&mut self, occluders: Arc<Occluders>) {
+        if self.policy.wants_seen_areas() {
+            self.seen.seen = Some(SeenAreas::new(occluders));
+        }
+    }
+
     /// Draws a frame. The next begins `interval_s` seconds after this one began, at the earliest.
     pub fn frame(&mut self, view: &View, interval_s: f64) -> Result<FrameReport> {
         self.before.clone_from(&self.selection.front);
@@ -139,6 +149,10 @@ impl<'a> Engine<'a> {
         seen.steady.follow(&self.costs, self.margin.ratio(), &self.drawn, is_still);
 
         let before = self.backend.now_ms();
+        let dt_s = self.seen.dt_s;
+        if let Some(seen) = &mut self.seen.seen {
+            seen.look(view, dt_s);
+        }
         self.policy.select(&self.seen.from(view), &mut self.selection);
         report.select_ms = self.backend.now_ms() - before;
         let front = &self.selection.front;

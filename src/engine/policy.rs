@@ -1,6 +1,6 @@
 //! The boundary at which ways of choosing levels of detail differ.
 
-use super::{CostModel, Residents, Visibility};
+use super::{CostModel, Residents, SeenAreas, Visibility};
 use crate::camera::View;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::MemoryUse;
@@ -14,6 +14,9 @@ pub struct FrameInput<'a> {
     pub view: &'a View,
     /// What was found so far of what it has in view: asked for by [`is_visible`](Self::is_visible).
     pub visibility: &'a Visibility,
+    /// How much of nodes is seen past what is before them, for policies that
+    /// [ask for it](Policy::wants_seen_areas).
+    pub seen: Option<&'a SeenAreas>,
     /// Where the camera is expected to be soon, if it goes on as it does; nearest in time first.
     pub predicted: &'a [PredictedView],
     /// Which nodes can be drawn now, and which are on their way.
@@ -70,6 +73,11 @@ pub trait Policy {
     /// Names of what [`Selection::diagnostics`] holds; the same in every frame.
     fn diagnostics(&self) -> &'static [&'static str] {
         &[]
+    }
+
+    /// Whether it is to be found out what hides what: [`FrameInput::seen`].
+    fn wants_seen_areas(&self) -> bool {
+        false
     }
 
     /// Chooses a front: nodes that cover everything visible, none of them above another, all of

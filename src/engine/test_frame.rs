@@ -53,6 +53,7 @@ impl TestFrame {
             tree: &self.tree,
             view: &self.view,
             visibility: &self.visibility,
+            seen: None,
             predicted: &[],
             residents: &self.residents,
             memory: self.memory,

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::format::{NODES_DIR, Scene, TEXTURES_DIR, file_crc};
+use crate::format::{NODES_DIR, NodeMesh, Scene, TEXTURES_DIR, file_crc, read_glb};
 use crate::render::content::{Content, Picture};
 use crate::{Error, Result};
 
@@ -107,6 +107,15 @@ impl NodeFiles {
             rest = after;
         }
         Ok(Arrival { node, content, pictures })
+    }
+
+    /// Reads the geometry of a node alone: its pictures stay encoded.
+    pub fn read_mesh(&self, node: u32) -> Result<NodeMesh> {
+        let mut reading = self.begin(node, |_| true);
+        let bytes = reading.left();
+        reading.read(bytes)?;
+        let path = reading.path().to_owned();
+        guarded(path.clone(), || read_glb(&reading.bytes, &path))
     }
 
     /// Reads and decodes a node in one go.

@@ -9,6 +9,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use crate::camera::View;
 use crate::format::{Node, Scene};
 
 /// What selection knows of a node. Indices are those of [`Scene::nodes`].
@@ -146,6 +147,22 @@ impl SceneTree {
     pub fn at(&self, places: Range<u32>) -> (&[u32], &[TreeNode]) {
         let places = places.start as usize..places.end as usize;
         (&self.indices[places.clone()], &self.nodes[places])
+    }
+
+    /// The node without parent that a node is below, or is.
+    pub fn root_of(&self, mut index: u32) -> u32 {
+        while let Some(parent) = self.node(index).parent {
+            index = parent;
+        }
+        index
+    }
+
+    /// Pixels that a metre takes in a view, at the nearest point of a node's box.
+    pub fn pixels_per_metre(&self, index: u32, view: &View) -> f64 {
+        let [min, max] = self.node(index).bbox;
+        let eye = view.pose.position;
+        let distance = eye.distance(eye.clamp(min, max)).max(self.diagonal() * 1e-6);
+        view.pixels_per_metre() / distance
     }
 
     /// Length of the diagonal of the box around everything, metres.

@@ -53,6 +53,7 @@ fn help_names_every_option_with_its_unit_and_range() {
         "milliseconds that a frame may take, above 0 [default: 30]",
         "[default: best-first]",
         "screen-error-loop",
+        "gain-over-price",
         "--set <CONSTANT=VALUE>",
         "0 or more [default: 0.1]",
         "KiB, MiB or GiB [default: 1GiB]",

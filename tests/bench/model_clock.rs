@@ -73,6 +73,7 @@ fn replay(scene: &Scene, frames: usize, target_ms: f64) -> Vec<FrameRecord> {
         policy: &mut *policy,
         residency: Arc::new(Mutex::new(residency)),
         backend: &mut backend,
+        occluders: None,
         costs: CostModel::new(&constants.prices),
         inspector: None,
         options,

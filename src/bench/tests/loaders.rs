@@ -79,6 +79,7 @@ fn replay(name: &str, cap: u64, loads: fn(u32) -> bool, is_broken: fn(u32) -> bo
         policy: &mut *options.policy.make().unwrap(),
         residency: Arc::new(Mutex::new(residency)),
         backend: &mut Loader { model, frames: 0, loads, is_broken },
+        occluders: None,
         costs: CostModel::new(&constants().prices),
         inspector: None,
         options,

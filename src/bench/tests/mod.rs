@@ -95,6 +95,7 @@ fn replay_by(
         policy: &mut *policy,
         residency: Arc::new(Mutex::new(residency)),
         backend: &mut backend,
+        occluders: None,
         costs: CostModel::new(&constants.prices),
         inspector: match inspector {
             Some(inspector) => Some(inspector),
@@ -324,6 +325,7 @@ fn a_front_that_is_none_ends_the_run_with_policy_frame_and_rule() {
         policy: &mut Overlapping::default(),
         residency: Arc::new(Mutex::new(residency)),
         backend: &mut ModelBackend::new(&tree, constants(), 0),
+        occluders: None,
         costs: CostModel::new(&constants().prices),
         inspector: None,
         options,

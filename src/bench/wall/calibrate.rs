@@ -152,6 +152,7 @@ fn choose(tree: &SceneTree, pose: &Pose, size: [u32; 2], pixels: f64) -> Result<
         tree,
         view: &View::new(*pose, DVec3::ZERO, size),
         visibility: &Visibility::default(),
+        seen: None,
         predicted: &[],
         residents: &Residents::all(tree.len()),
         memory: MemoryUse { cap_bytes: u64::MAX, ..MemoryUse::default() },

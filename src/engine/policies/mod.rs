@@ -5,6 +5,7 @@
 mod adaptive_display;
 mod best_first;
 mod descent;
+mod gain_over_price;
 pub mod lakhia;
 mod parameter;
 mod ranked;
@@ -32,8 +33,9 @@ pub struct PolicyKind {
 }
 
 /// All policies; the first is the default.
-pub const POLICIES: [PolicyKind; 6] = [
+pub const POLICIES: [PolicyKind; 7] = [
     best_first::KIND,
+    gain_over_price::KIND,
     lakhia::KIND,
     adaptive_display::KIND,
     screen_area::KIND,

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use crate::engine::{FrameInput, FrontLoad, Load, Selection, geometry_load};
 
 /// Milliseconds; nothing is free, so that gains can be divided by costs.
-const LEAST_MS: f64 = 1e-6;
+pub(super) const LEAST_MS: f64 = 1e-6;
 
 /// A node by rank; the lower number is first among equals.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,40 @@
+//! Coarse geometry that hides what is behind it.
+
+use glam::{DVec3, Vec3};
+
+use crate::format::NodeMesh;
+use crate::mesh::AlphaMode;
+
+/// The opaque surface of a node.
+#[derive(Clone, Debug)]
+pub(super) struct Occluder {
+    /// Least and greatest source coordinates.
+    pub bbox: [DVec3; 2],
+    /// Source coordinates from which positions are metres away.
+    pub origin: DVec3,
+    pub positions: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// The opaque surfaces of some nodes, in memory for as long as a scene is.
+#[derive(Clone, Debug, Default)]
+pub struct Occluders {
+    pub(super) surfaces: Vec<Occluder>,
+}
+
+impl Occluders {
+    /// Adds what of a node is opaque, and within the box `bbox`.
+    pub fn add(&mut self, bbox: [DVec3; 2], mesh: &NodeMesh) {
+        let mut positions = Vec::new();
+        let mut triangles = Vec::new();
+        let is_opaque = |alpha: &AlphaMode| matches!(alpha, AlphaMode::Opaque);
+        for primitive in mesh.primitives.iter().filter(|at| is_opaque(&at.surface.alpha)) {
+            let first = positions.len() as u32;
+            positions.extend(primitive.positions.iter().map(|&at| Vec3::from(at)));
+            let triples = primitive.indices.as_chunks().0;
+            triangles.extend(triples.iter().map(|triple: &[u32; 3]| triple.map(|at| first + at)));
+        }
+        let origin = DVec3::from(mesh.origin);
+        self.surfaces.push(Occluder { bbox, origin, positions, triangles });
+    }
+}

@@ -1,0 +1,232 @@
+//! How much of nodes is seen, past what is before them.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::depth_picture::{DepthPicture, SIZE};
+use super::occluders::Occluders;
+use crate::camera::View;
+use crate::runtime::SceneTree;
+
+/// A picture begins so many seconds after the one before, or later.
+const EVERY_S: f64 = 0.1;
+
+/// Triangles that are drawn in a frame, unless a single surface has more.
+const TRIANGLES: usize = 3000;
+
+/// The part of what is under a node's box that is seen of it where nothing else is known. Measured of
+/// nodes in walks, flights and orbits of eight scenes, the median is 0.3 to 0.4.
+const USUAL: f64 = 0.3;
+
+/// As how many pixels that weighs.
+const WEIGHT: f64 = 2.0;
+
+/// Pixels across, and up, that are looked at of a box.
+const LOOKED: usize = 16;
+
+/// What is seen from somewhere, once it is known.
+#[derive(Clone, Debug)]
+struct Known {
+    view: View,
+    /// By pixel: where what is seen is, metres from the eye; infinite where nothing is.
+    points: [Vec<f32>; 3],
+}
+
+/// How much of nodes is seen, past what is before them.
+///
+/// Occluders are drawn into a small picture of depths, some in each frame, near ones first. Of the
+/// pixels under a node's box, the node is seen in those in which what is nearest is in the box: so
+/// that coarse levels tell of finer ones, of which nothing need be in memory.
+#[derive(Clone, Debug)]
+pub struct SeenAreas {
+    occluders: Arc<Occluders>,
+    picture: DepthPicture,
+    view: Option<View>,
+    /// What is not drawn yet.
+    left: VecDeque<u32>,
+    since_s: f64,
+    known: Option<Known>,
+    pictures: u32,
+}
+
+impl SeenAreas {
+    /// Before any view.
+    pub fn new(occluders: Arc<Occluders>) -> Self {
+        Self {
+            occluders,
+            picture: DepthPicture::new(),
+            view: None,
+            left: VecDeque::new(),
+            since_s: f64::INFINITY,
+            known: None,
+            pictures: 0,
+        }
+    }
+
+    /// The number of the picture that is known; another where anything may have changed.
+    pub fn picture(&self) -> u32 {
+        self.pictures
+    }
+
+    /// Goes on with the picture at hand, or begins one of this view; `dt_s` seconds after the frame
+    /// before. The first is drawn in one go.
+    pub fn look(&mut self, view: &View, dt_s: f64) {
+        self.since_s += dt_s;
+        if self.view.is_none() && !self.begin(view) {
+            return;
+        }
+        let mut drawn = 0;
+        while drawn < TRIANGLES || self.known.is_none() {
+            let Some(next) = self.left.pop_front() else { break };
+            let occluder = &self.occluders.surfaces[next as usize];
+            self.picture.draw(occluder);
+            drawn += occluder.triangles.len();
+        }
+        if self.left.is_empty() {
+            self.finish();
+        }
+    }
+
+    /// Begins a picture of a view, unless that is known or it is too soon.
+    fn begin(&mut self, view: &View) -> bool {
+        let is_known = self.known.as_ref().is_some_and(|known| known.view.pose == view.pose);
+        if is_known || self.since_s < EVERY_S {
+            return false;
+        }
+        self.since_s = 0.0;
+        self.view = Some(*view);
+        self.picture.begin(view);
+        let eye = view.pose.position;
+        let mut in_view: Vec<(f64, u32)> = (0..)
+            .zip(&self.occluders.surfaces)
+            .filter(|(_, at)| view.frustum.outside(at.bbox) <= 0.0)
+            .map(|(index, at)| (eye.distance_squared(eye.clamp(at.bbox[0], at.bbox[1])), index))
+            .collect();
+        in_view.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        self.left.clear();
+        self.left.extend(in_view.into_iter().map(|(_, index)| index));
+        true
+    }
+
+    fn finish(&mut self) {
+        let Some(view) = self.view.take() else { return };
+        let mut points = self.known.take().map(|known| known.points).unwrap_or_default();
+        self.picture.points_into(&mut points);
+        self.known = Some(Known { view, points });
+        self.pictures += 1;
+    }
+
+    /// Square metres across the line of sight in which a node was seen; `None` where it was out of the
+    /// view that is known.
+    pub fn of(&self, tree: &SceneTree, node: u32) -> Option<f64> {
+        let Known { view, points } = self.known.as_ref()?;
+        let [min, max] = tree.node(node).bbox;
+        let rectangle = view.frustum.rectangle([min, max])?;
+        // The surface of the root may be off by its error.
+        let reach = 2.0 * tree.node(tree.root_of(node)).mean_error;
+        let eye = view.pose.position;
+        let inside = [(min - reach - eye).as_vec3(), (max + reach - eye).as_vec3()];
+        let [columns, rows] = pixels(rectangle);
+        let step = |pixels: usize| pixels.div_ceil(LOOKED).max(1);
+        let (mut looked, mut seen) = (0u32, 0u32);
+        for row in rows.clone().step_by(step(rows.len())) {
+            for column in columns.clone().step_by(step(columns.len())) {
+                let at = row * SIZE[0] + column;
+                let at = Vec3::from_array([0, 1, 2].map(|axis| points[axis][at]));
+                looked += 1;
+                seen += u32::from(at.clamp(inside[0], inside[1]) == at);
+            }
+        }
+        let part = (f64::from(seen) + WEIGHT * USUAL) / (f64::from(looked) + WEIGHT);
+        Some(part * across(tree, node, view))
+    }
+
+    /// The same where nothing is known, from a view.
+    pub fn usual(tree: &SceneTree, node: u32, view: &View) -> f64 {
+        USUAL * across(tree, node, view)
+    }
+}
+
+/// Square metres across the line of sight that are under the box of a node, at its nearest point; as
+/// parts of the picture at a pixel a metre.
+fn across(tree: &SceneTree, node: u32, view: &View) -> f64 {
+    let per_metre = tree.pixels_per_metre(node, view);
+    view.frustum.covered(tree.node(node).bbox) / (per_metre * per_metre)
+}
+
+/// The columns and rows of which the middles are in a rectangle of the picture.
+fn pixels([across, up]: [[f64; 2]; 2]) -> [std::ops::Range<usize>; 2] {
+    let range = |from: f64, to: f64, pixels: usize| {
+        let place = |end: f64| ((end + 1.0) / 2.0 * pixels as f64 - 0.5).ceil().max(0.0) as usize;
+        place(from).min(pixels)..place(to).min(pixels)
+    };
+    // Rows are from above.
+    [range(across[0], across[1], SIZE[0]), range(-up[1], -up[0], SIZE[1])]
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::engine::occlusion::occluders::Occluder;
+    use crate::runtime::test_tree::{sketch, tree, view};
+
+    /// A square across the view, so far away, of two triangles.
+    fn wall(distance: f32, half: f32) -> Occluder {
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let [min, max] = [-half, half].map(|at| Vec3::new(distance, at, at).as_dvec3());
+        Occluder {
+            bbox: [min, max],
+            origin: DVec3::ZERO,
+            positions: corners.map(|[y, z]| Vec3::new(distance, y * half, z * half)).to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        }
+    }
+
+    fn areas(surfaces: Vec<Occluder>) -> SeenAreas {
+        SeenAreas::new(Arc::new(Occluders { surfaces }))
+    }
+
+    /// The parts of what is under the boxes of two cubes, 2 m wide at 11.3 and 21.3 m, that are seen.
+    fn seen(surfaces: Vec<Occluder>) -> [f64; 2] {
+        let tree = tree([11.3, 21.3].map(|x| sketch([x, 0.0, 0.0], 1.0, vec![])).into());
+        let mut areas = areas(surfaces);
+        areas.look(&view(), 0.0);
+        [0, 1].map(|node| areas.of(&tree, node).unwrap() / across(&tree, node, &view()))
+    }
+
+    #[test]
+    fn what_is_behind_a_wall_is_not_seen_and_what_is_beside_it_is() {
+        let [near, far] = seen(vec![wall(10.35, 1.05), wall(20.35, 1.05)]);
+        assert!(near > 0.9 && far < 0.05, "{near} {far}");
+        let [near, far] = seen(vec![wall(20.35, 1.05)]);
+        assert!(near < 0.05 && far > 0.9, "nothing of the near one is there: {near} {far}");
+        let [_, far] = seen(vec![wall(10.35, 0.25), wall(20.35, 1.05)]);
+        assert!((0.6..0.8).contains(&far), "a fourth of it is hidden: {far}");
+    }
+
+    #[test]
+    fn what_is_hidden_is_known_some_frames_later_and_out_of_view_never() {
+        let boxes = tree([11.0, -11.0].map(|x| sketch([x, 0.0, 0.0], 1.0, vec![])).into());
+        let many = Occluder { triangles: vec![[0, 1, 2]; TRIANGLES], ..wall(5.0, 0.1) };
+        let mut areas = areas(vec![many, wall(10.5, 1.0)]);
+        areas.look(&view(), 0.03);
+        assert_eq!(areas.picture(), 1, "the first at once");
+        assert_eq!(areas.of(&boxes, 1), None);
+        for _ in 0..10 {
+            areas.look(&view(), 0.03);
+        }
+        assert_eq!(areas.picture(), 1, "nothing moves");
+        let mut moved = view();
+        moved.pose.position.y += 0.1;
+        let moved = View::new(moved.pose, DVec3::ZERO, moved.size);
+        areas.look(&moved, 0.03);
+        assert_eq!(areas.picture(), 1, "half of it is drawn");
+        areas.look(&view(), 0.03);
+        assert_eq!(areas.picture(), 2, "the rest is");
+        assert_eq!(areas.known.map(|known| known.view.pose), Some(moved.pose));
+    }
+}

@@ -1,0 +1,76 @@
+//! What the image gains where a node gives way to its children.
+
+use crate::engine::{FrameInput, SeenAreas};
+
+/// What was seen of a node is half forgotten after so many seconds.
+const HALF_LIFE_S: f64 = 5.0;
+
+/// How large nodes were seen, of late.
+///
+/// What is seen of a node changes with every turn of the camera, at the picture's edges most. So that
+/// levels need not, what counts is the most that was seen of it, forgotten slowly.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Gain {
+    now_s: f64,
+    nodes: Vec<Seen>,
+}
+
+/// What was seen of a node.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    /// Square metres across the line of sight, over the pixels of a picture.
+    area: f64,
+    /// When that was found.
+    then_s: f64,
+    /// In which picture of depths.
+    picture: u32,
+}
+
+impl Gain {
+    pub fn begin_frame(&mut self, nodes: usize, dt_s: f64) {
+        self.now_s += dt_s;
+        self.nodes.resize(nodes, Seen::default());
+    }
+
+    /// What the image gains by the children of a node: the part of it in which the node is seen, times
+    /// how much less wrong its pixels are.
+    pub fn of(&mut self, frame: &FrameInput<'_>, node: u32) -> f64 {
+        let per_metre = frame.tree.pixels_per_metre(node, frame.view);
+        let part = self.seen(frame, node) * per_metre * per_metre;
+        part.min(1.0) * removed(frame, node, per_metre)
+    }
+
+    /// The most that was seen of a node, of late.
+    fn seen(&mut self, frame: &FrameInput<'_>, node: u32) -> f64 {
+        let &FrameInput { tree, view, seen, .. } = frame;
+        let picture = seen.map_or(0, SeenAreas::picture);
+        let before = self.nodes[node as usize];
+        let area = before.area * libm::exp2((before.then_s - self.now_s) / HALF_LIFE_S);
+        let found = match seen {
+            _ if !frame.is_visible(node) => 0.0,
+            None => SeenAreas::usual(tree, node, view),
+            Some(_) if before.picture == picture => 0.0,
+            Some(seen) => seen.of(tree, node).unwrap_or_else(|| SeenAreas::usual(tree, node, view)),
+        };
+        let area = area.max(found);
+        self.nodes[node as usize] = Seen { area, then_s: self.now_s, picture };
+        area
+    }
+
+    /// The same of what need not be in view, where all of it would be seen.
+    pub fn anywhere(frame: &FrameInput<'_>, node: u32) -> f64 {
+        let per_metre = frame.tree.pixels_per_metre(node, frame.view);
+        let [min, max] = frame.tree.node(node).bbox;
+        let [width, height] = frame.view.size.map(f64::from);
+        let pixels = (max - min).length() / 2.0 * per_metre;
+        (pixels * pixels / (width * height)).min(1.0) * removed(frame, node, per_metre)
+    }
+}
+
+/// How much less wrong each pixel of a node is by its children.
+fn removed(frame: &FrameInput<'_>, node: u32, per_metre: f64) -> f64 {
+    let (at, children) = (frame.tree.node(node), frame.tree.children(node));
+    let wrong = |error: f64| (error * per_metre).sqrt();
+    let errors = children.iter().map(|&child| wrong(frame.tree.node(child).mean_error));
+    (wrong(at.mean_error) - errors.sum::<f64>() / children.len().max(1) as f64).max(0.0)
+}

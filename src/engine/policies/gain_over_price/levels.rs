@@ -1,0 +1,86 @@
+//! Which nodes are refined, since when, and how soon that may change.
+
+use super::Options;
+
+/// A node that is brought back to the level that it had within so many seconds rests longer each time.
+const BACK_WITHIN_S: f64 = 15.0;
+
+/// By how much longer.
+const LONGER: f64 = 16.0;
+
+/// No longer than this.
+const LONGEST_S: f64 = 600.0;
+
+/// A node whose rank is so many times what it was need not rest any longer.
+const RISEN: f64 = 2.0;
+
+/// What is known of one node.
+#[derive(Clone, Copy, Debug)]
+struct Level {
+    /// Whether its children stand for it when it is in view.
+    is_refined: bool,
+    /// When that was last chosen to change, seconds.
+    changed_s: f64,
+    /// How long it rests from then on.
+    rest_s: f64,
+    /// Its rank at that time.
+    rank: f64,
+}
+
+const UNTOUCHED: Level =
+    Level { is_refined: false, changed_s: f64::NEG_INFINITY, rest_s: 0.0, rank: 0.0 };
+
+/// The levels of all nodes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Levels {
+    now_s: f64,
+    dwell_s: f64,
+    nodes: Vec<Level>,
+}
+
+impl Levels {
+    pub fn begin_frame(&mut self, nodes: usize, dt_s: f64, options: &Options) {
+        self.nodes.resize(nodes, UNTOUCHED);
+        self.now_s += dt_s;
+        self.dwell_s = options.dwell_s;
+    }
+
+    pub fn is_refined(&self, node: u32) -> bool {
+        self.nodes[node as usize].is_refined
+    }
+
+    /// Its children stand for it.
+    pub fn refine(&mut self, node: u32) {
+        let level = &mut self.nodes[node as usize];
+        (level.is_refined, level.changed_s) = (true, self.now_s);
+    }
+
+    /// It stands for itself, without having been chosen to.
+    pub fn lose(&mut self, node: u32) {
+        self.nodes[node as usize].is_refined = false;
+    }
+
+    /// It stands for itself again, at a rank.
+    pub fn coarsen(&mut self, node: u32, rank: f64, options: &Options) {
+        let level = &mut self.nodes[node as usize];
+        let is_back = self.now_s - level.changed_s < BACK_WITHIN_S;
+        level.rest_s = match is_back {
+            true => (level.rest_s * LONGER).clamp(options.backoff_s, LONGEST_S),
+            false => options.dwell_s,
+        };
+        (level.is_refined, level.changed_s, level.rank) = (false, self.now_s, rank);
+    }
+
+    /// Whether a node that is refined was not long ago.
+    pub fn is_fresh(&self, node: u32) -> bool {
+        self.now_s - self.nodes[node as usize].changed_s < self.dwell_s
+    }
+
+    /// Whether a node of this rank is not to be refined yet, where the least rank of those that are
+    /// is `least`.
+    pub fn rests(&self, node: u32, rank: f64, least: f64) -> bool {
+        let Level { changed_s, rest_s, rank: then, .. } = self.nodes[node as usize];
+        let since_s = self.now_s - changed_s;
+        since_s < self.dwell_s || since_s < rest_s && rank < RISEN * then.min(least)
+    }
+}

@@ -1,0 +1,292 @@
+//! Gain over price, going on from the front of the frame before.
+//!
+//! Every node that could give way to its children has a rank: what the image gains by them, over what
+//! they take. A frame that would be late is relieved at once, by the nodes of the least rank. What is
+//! left of its time is filled by those of the highest; where none is left, what ranks lower by a factor
+//! (`hysteresis`) makes way. Between the two, both levels of a node may stay as they are, and do. Once
+//! changed, a node rests for `dwell_s`; one that was relieved of what it had just got rests longer each
+//! time, unless its rank has doubled meanwhile: a camera that sways comes to rest. What is out of view
+//! keeps its level.
+
+mod gain;
+mod levels;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BinaryHeap;
+
+use super::parameter::{Parameter, info, parameter, with_settings};
+use super::ranked::{LEAST_MS, Ranked, count_culled, front_ms, refining_ms, visible_children};
+use super::{PolicyKind, Settings};
+use crate::Result;
+use crate::engine::{FrameInput, Policy, Selection, geometry_load};
+use gain::Gain;
+use levels::Levels;
+
+const NAME: &str = "gain-over-price";
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Options {
+    hysteresis: f64,
+    dwell_s: f64,
+    backoff_s: f64,
+    slack: f64,
+    away: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { hysteresis: 1.5, dwell_s: 0.5, backoff_s: 16.0, slack: 0.02, away: 0.2 }
+    }
+}
+
+const PARAMETERS: [Parameter<Options>; 5] = [
+    parameter!(hysteresis, 1.0, 100.0, "how many times higher ranks what others make way for"),
+    parameter!(dwell_s, 0.0, 60.0, "seconds for which a node keeps a level, unless time is short"),
+    parameter!(
+        backoff_s,
+        0.0,
+        60.0,
+        "seconds for which a node keeps a level to which it had soon to return; longer each time"
+    ),
+    parameter!(
+        slack,
+        0.0,
+        0.5,
+        "part of its time by which a frame is longer before it is relieved"
+    ),
+    parameter!(away, 0.0, 1.0, "what a node out of view is worth in memory, over one in view"),
+];
+
+pub(super) const KIND: PolicyKind = PolicyKind {
+    name: NAME,
+    summary: "what the image gains over what it takes, with hysteresis, from the frame before",
+    source: "this project",
+    parameters: || info(&Options::default(), &PARAMETERS),
+    make: |settings: &Settings| -> Result<Box<dyn Policy>> {
+        let options = with_settings(NAME, Options::default(), &PARAMETERS, settings)?;
+        Ok(Box::new(GainOverPrice { options, ..GainOverPrice::default() }))
+    },
+};
+
+#[derive(Clone, Debug, Default)]
+struct GainOverPrice {
+    options: Options,
+    gain: Gain,
+    levels: Levels,
+    /// By node: its rank, where it was visited in the frame at hand.
+    ranks: Vec<f64>,
+    /// Nodes that could be refined, the highest rank first.
+    upgrades: BinaryHeap<Ranked>,
+    /// Refined nodes of which no child in view is refined, the least rank first.
+    downgrades: BinaryHeap<Ranked>,
+    /// Those that make way for an upgrade.
+    way: Vec<u32>,
+    /// In view, coarse to fine.
+    visited: Vec<u32>,
+    queue: Vec<u32>,
+}
+
+impl GainOverPrice {
+    fn rank(&mut self, frame: &FrameInput<'_>, node: u32) -> f64 {
+        self.gain.of(frame, node) / price(frame, node)
+    }
+
+    /// Goes down what is refined and can stay so.
+    fn walk(&mut self, frame: &FrameInput<'_>) {
+        self.visited.clear();
+        let roots = frame.tree.roots().iter();
+        let is_there = |&&root: &&u32| frame.residents.contains(root) && frame.is_visible(root);
+        self.visited.extend(roots.filter(is_there));
+        let mut at = 0;
+        while let Some(&node) = self.visited.get(at) {
+            at += 1;
+            if !self.levels.is_refined(node) {
+                continue;
+            } else if frame.can_refine(node) {
+                self.visited.extend(visible_children(frame, node));
+            } else {
+                self.levels.lose(node);
+            }
+        }
+    }
+
+    /// What of the nodes visited is drawn.
+    fn front_into(&self, out: &mut Selection) {
+        out.front.clear();
+        let is_drawn = |&&node: &&u32| !self.levels.is_refined(node);
+        out.front.extend(self.visited.iter().filter(is_drawn));
+    }
+
+    fn is_last(&self, frame: &FrameInput<'_>, node: u32) -> bool {
+        visible_children(frame, node).all(|child| !self.levels.is_refined(child))
+    }
+
+    fn push_upgrade(&mut self, frame: &FrameInput<'_>, node: u32) {
+        let rank = self.ranks[node as usize];
+        if rank > 0.0 && frame.can_refine(node) {
+            self.upgrades.push(Ranked { rank, node });
+        }
+    }
+
+    fn push_downgrade(&mut self, frame: &FrameInput<'_>, node: u32) {
+        if self.is_last(frame, node) {
+            self.downgrades.push(Ranked { rank: -self.ranks[node as usize], node });
+        }
+    }
+
+    fn upgrade(&mut self, frame: &FrameInput<'_>, node: u32) {
+        self.levels.refine(node);
+        self.queue.clear();
+        self.queue.extend(visible_children(frame, node));
+        for child in std::mem::take(&mut self.queue) {
+            // It may have been refined when its parent was last.
+            self.levels.lose(child);
+            if !frame.tree.children(child).is_empty() {
+                self.ranks[child as usize] = self.rank(frame, child);
+                self.push_upgrade(frame, child);
+            }
+        }
+        self.push_downgrade(frame, node);
+    }
+
+    fn downgrade(&mut self, frame: &FrameInput<'_>, node: u32) {
+        self.levels.coarsen(node, self.ranks[node as usize], &self.options);
+        if let Some(parent) = frame.tree.node(node).parent {
+            self.push_downgrade(frame, parent);
+        }
+    }
+
+    /// The refined node of the least rank.
+    fn worst(&mut self, frame: &FrameInput<'_>) -> Option<u32> {
+        while let Some(&Ranked { node, .. }) = self.downgrades.peek() {
+            if self.levels.is_refined(node) && self.is_last(frame, node) {
+                return Some(node);
+            }
+            self.downgrades.pop();
+        }
+        None
+    }
+
+    /// Coarsens until a frame of `ms` milliseconds is not late.
+    fn relieve(&mut self, frame: &FrameInput<'_>, mut ms: f64) -> f64 {
+        if ms > frame.budget_ms * (1.0 + self.options.slack) {
+            while ms > frame.budget_ms {
+                let Some(node) = self.worst(frame) else { break };
+                ms -= refining_ms(frame, node);
+                self.downgrade(frame, node);
+            }
+        }
+        ms
+    }
+
+    /// Refines while there is time, or what makes way.
+    fn refine(&mut self, frame: &FrameInput<'_>, mut ms: f64) {
+        while let Some(Ranked { rank, node }) = self.upgrades.pop() {
+            let least = self.worst(frame).map_or(0.0, |worst| self.ranks[worst as usize]);
+            if self.levels.rests(node, rank, least) {
+                continue;
+            }
+            let more_ms = ms + refining_ms(frame, node);
+            let Some(freed_ms) = self.make_way(frame, rank, more_ms - frame.budget_ms) else {
+                break;
+            };
+            ms = more_ms - freed_ms;
+            self.upgrade(frame, node);
+        }
+    }
+
+    /// Coarsens what ranks so much lower than `rank` that it makes way, until `over_ms` are freed;
+    /// nothing where that does not come to as much.
+    fn make_way(&mut self, frame: &FrameInput<'_>, rank: f64, over_ms: f64) -> Option<f64> {
+        let mut way = std::mem::take(&mut self.way);
+        way.clear();
+        let mut freed_ms = 0.0;
+        while freed_ms < over_ms {
+            let Some(worst) = self.worst(frame) else { break };
+            let worst_rank = self.ranks[worst as usize];
+            if worst_rank * self.options.hysteresis >= rank || self.levels.is_fresh(worst) {
+                break;
+            }
+            self.downgrades.pop();
+            freed_ms += refining_ms(frame, worst);
+            way.push(worst);
+        }
+        let is_enough = freed_ms >= over_ms;
+        for &node in &way {
+            match is_enough {
+                true => self.downgrade(frame, node),
+                false => self.push_downgrade(frame, node),
+            }
+        }
+        self.way = way;
+        is_enough.then_some(freed_ms)
+    }
+
+    /// What is wanted in memory: the children of what is visited.
+    fn request(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
+        out.requests.extend(frame.tree.roots().iter().map(|&root| (root, f64::MAX)));
+        for &node in &self.visited {
+            let rank = self.ranks[node as usize];
+            out.requests.extend(frame.tree.children(node).iter().map(|&child| (child, rank)));
+        }
+    }
+}
+
+/// Milliseconds that all children of a node take more than it does, whatever of them is in view.
+fn price(frame: &FrameInput<'_>, node: u32) -> f64 {
+    let ms = |node: u32| frame.costs.added_ms(&geometry_load(frame.tree.node(node)));
+    let children = frame.tree.children(node).iter().map(|&child| ms(child));
+    (children.sum::<f64>() - ms(node)).max(LEAST_MS)
+}
+
+impl Policy for GainOverPrice {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn wants_seen_areas(&self) -> bool {
+        true
+    }
+
+    fn select(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
+        out.clear();
+        self.levels.begin_frame(frame.tree.len(), frame.dt_s, &self.options);
+        self.gain.begin_frame(frame.tree.len(), frame.dt_s);
+        self.ranks.resize(frame.tree.len(), 0.0);
+        self.upgrades.clear();
+        self.downgrades.clear();
+        self.walk(frame);
+        for at in 0..self.visited.len() {
+            let node = self.visited[at];
+            if frame.tree.children(node).is_empty() {
+                continue;
+            }
+            self.ranks[node as usize] = self.rank(frame, node);
+            match self.levels.is_refined(node) {
+                true => self.push_downgrade(frame, node),
+                false => self.push_upgrade(frame, node),
+            }
+        }
+        self.front_into(out);
+        let ms = self.relieve(frame, front_ms(frame, &out.front));
+        self.refine(frame, ms);
+        self.walk(frame);
+        self.front_into(out);
+        // Finer nodes also hide and cover other parts of the image, which none of them pays for.
+        self.relieve(frame, front_ms(frame, &out.front));
+        self.walk(frame);
+        self.front_into(out);
+        self.request(frame, out);
+        count_culled(frame, out);
+    }
+
+    fn utility(&self, frame: &FrameInput<'_>, node: u32) -> f64 {
+        match frame.tree.node(node).parent {
+            Some(parent) => {
+                self.options.away * Gain::anywhere(frame, parent) / price(frame, parent)
+            }
+            None => f64::MAX,
+        }
+    }
+}

@@ -1,0 +1,215 @@
+use super::*;
+use crate::camera::{View, from_angles};
+use crate::engine::test_frame::TestFrame;
+use crate::mesh::UpAxis;
+use crate::random::Random;
+use crate::runtime::test_tree::{Sketch, sketch, tree};
+
+/// A root at a distance, with children of 10 triangles each; refining it takes 10 ms for every
+/// child after the first.
+fn root(distance: f64, error: f64, children: usize) -> Sketch {
+    let at = [distance + 1.0, 0.0, 0.0];
+    let children = (0..children).map(|_| sketch(at, 1.0, vec![])).collect();
+    Sketch { error, ..sketch(at, 1.0, children) }
+}
+
+fn policy(settings: &[(&str, f64)]) -> Box<dyn Policy> {
+    KIND.make(&settings.iter().map(|&(name, value)| (name.into(), value)).collect()).unwrap()
+}
+
+/// What is drawn once the policy has had a minute.
+fn settled(frame: &TestFrame, policy: &mut dyn Policy) -> Vec<u32> {
+    (0..1800).map(|_| frame.front(policy)).last().unwrap()
+}
+
+#[test]
+fn the_highest_gain_for_its_price_comes_first_and_no_time_is_left_that_another_fits_in() {
+    // Far: 0 → 1, 2 gains little; near: 3 → 4, 5 much; 6 → 7, 8, 9 more but takes twice.
+    let trees = vec![root(40.0, 0.1, 2), root(10.0, 0.1, 2), root(10.0, 0.15, 3)];
+    let mut frame = TestFrame::new(tree(trees));
+    for (target_ms, front) in [
+        (30.0, &[0, 3, 6][..]),
+        (40.0, &[0, 4, 5, 6]),
+        (60.0, &[0, 4, 5, 7, 8, 9]),
+        (70.0, &[1, 2, 4, 5, 7, 8, 9]),
+        (5.0, &[0, 3, 6]), // roots are never skipped
+    ] {
+        frame.target_ms = target_ms;
+        assert_eq!(settled(&frame, &mut *policy(&[])), front, "{target_ms} ms");
+    }
+}
+
+#[test]
+fn a_frame_that_would_be_late_is_relieved_at_once_and_detail_returns_later() {
+    let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), root(11.0, 0.1, 2)]));
+    let mut policy = policy(&[("dwell_s", 0.5)]);
+    frame.target_ms = 40.0;
+    assert_eq!(settled(&frame, &mut *policy), [1, 2, 4, 5]);
+    frame.target_ms = 30.0;
+    assert_eq!(frame.front(&mut *policy), [1, 2, 3], "what gains least, and no more than that");
+    frame.target_ms = 40.0;
+    let returned = (1..60).find(|_| frame.front(&mut *policy) == [1, 2, 4, 5]).unwrap();
+    assert!((15..=16).contains(&returned), "{returned} frames of 1/30 s");
+}
+
+/// Whether the farther of two is refined rather than the nearer, once the camera went so many metres
+/// towards both. From where it begins both rank alike; from further on, the nearer ranks higher.
+fn is_farther(metres: &[f64], settings: &[(&str, f64)]) -> Vec<bool> {
+    let small = |distance: f64, error: f64| {
+        let at = [distance, 0.0, 0.0];
+        let small = |children, error| Sketch { size: 0.1, error, ..sketch(at, 1.0, children) };
+        small((0..2).map(|_| small(vec![], 0.0)).collect(), error)
+    };
+    // Gains fall with the square of the distance, and with its root as errors do.
+    let farther_error = 0.1 * 1.4f64.powi(5);
+    let mut frame = TestFrame::new(tree(vec![small(10.0, 0.1), small(14.0, farther_error)]));
+    frame.target_ms = 30.0;
+    let mut policy = policy(settings);
+    let mut is_farther = Vec::new();
+    for &metres in metres {
+        let mut pose = frame.view.pose;
+        pose.position.x = metres;
+        frame.view = View::new(pose, frame.view.velocity, frame.view.size);
+        let front = settled(&frame, &mut *policy);
+        assert!(front == [0, 4, 5] || front == [1, 2, 3], "{front:?}");
+        is_farther.push(front == [0, 4, 5]);
+    }
+    is_farther
+}
+
+#[test]
+fn what_ranks_a_little_higher_does_not_take_the_place_of_what_is_drawn() {
+    let path = [0.5, -0.5, 0.5, -15.0, 0.5, -0.5, 5.0];
+    assert_eq!(is_farther(&path, &[]), [false, false, false, true, true, true, false]);
+    let without = is_farther(&path, &[("hysteresis", 1.0)]);
+    assert_eq!(without, [false, true, false, true, false, true, false]);
+}
+
+/// Changes of what is drawn in each of ten periods of six seconds, in which frames take longer for
+/// half of the time.
+fn changes(settings: &[(&str, f64)]) -> Vec<usize> {
+    let trees = (0..4).map(|at| root(10.0 + f64::from(at), 0.1, 2)).collect();
+    let mut frame = TestFrame::new(tree(trees));
+    let mut policy = policy(settings);
+    let mut fronts = Vec::new();
+    for index in 0..1800 {
+        frame.target_ms = if index % 180 < 90 { 80.0 } else { 60.0 };
+        fronts.push(frame.front(&mut *policy));
+        assert!(fronts.last().is_some_and(|front| front.len() as f64 * 10.0 <= frame.target_ms));
+    }
+    let count = |period: &[Vec<u32>]| period.windows(2).filter(|at| at[0] != at[1]).count();
+    fronts.chunks(180).map(count).collect()
+}
+
+#[test]
+fn a_camera_that_sways_comes_to_rest() {
+    let changes_of = changes(&[]);
+    assert!(changes_of[0] > 0 && changes_of[5..].iter().all(|&at| at == 0), "{changes_of:?}");
+    let without = changes(&[("backoff_s", 0.0)]);
+    assert!(without.iter().all(|&at| at > 0), "{without:?}");
+}
+
+#[test]
+fn what_was_out_of_view_is_drawn_as_it_was() {
+    let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2)]));
+    frame.target_ms = 20.0;
+    let mut policy = policy(&[]);
+    let ahead = frame.view;
+    assert_eq!(settled(&frame, &mut *policy), [1, 2]);
+    let pose = crate::camera::Pose {
+        rotation: from_angles(UpAxis::Z, 180.0, 0.0, 0.0),
+        ..frame.view.pose
+    };
+    frame.view = View::new(pose, frame.view.velocity, frame.view.size);
+    assert!(settled(&frame, &mut *policy).is_empty());
+    frame.view = ahead;
+    assert_eq!(frame.front(&mut *policy), [1, 2]);
+}
+
+#[test]
+fn what_is_not_in_memory_is_asked_for_and_passed_over() {
+    let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), root(40.0, 0.1, 2)]));
+    frame.residents.set(1, false);
+    frame.target_ms = 30.0;
+    let selection = frame.select(&mut *policy(&[]));
+    let mut front = selection.front.clone();
+    front.sort_unstable();
+    assert_eq!(front, [0, 4, 5]);
+    assert!(selection.requests.iter().any(|&(node, utility)| node == 1 && utility > 0.0));
+}
+
+/// A node of 10 to 19 triangles with two or three children in its halves, down to a depth.
+fn random_node(random: &mut Random, at: [f64; 3], size: f64, depth: u32) -> Sketch {
+    let count = if depth == 0 { 0 } else { 2 + random.below(2) };
+    let children: Vec<Sketch> = (0..count)
+        .map(|_| {
+            let at = at.map(|at| at + (random.unit() - 0.5) * size / 2.0);
+            random_node(random, at, size / 2.0, depth - 1)
+        })
+        .collect();
+    let below = children.iter().map(|child| child.error).fold(0.0, f64::max);
+    let error = if depth == 0 { 0.0 } else { below + size * random.between(0.002, 0.01) };
+    let triangles = 10 + random.below(10) as u32; // fewer than its children have
+    Sketch { size, error, triangles, ..sketch(at, 1.0, children) }
+}
+
+/// Gain that could be had of a scene in some time if levels could be mixed and nodes refined whose
+/// parents are not: no front gains more.
+fn relaxed(mut steps: Vec<(f64, f64)>, mut left_ms: f64) -> f64 {
+    steps.sort_by(|a, b| (b.0 / b.1).total_cmp(&(a.0 / a.1)));
+    let mut sum = 0.0;
+    for (gain, ms) in steps {
+        sum += gain * (left_ms / ms).clamp(0.0, 1.0);
+        left_ms -= ms;
+    }
+    sum
+}
+
+#[test]
+fn little_is_lost_against_the_relaxed_optimum() {
+    let mut random = Random::new(17, 0);
+    for case in 0..20 {
+        let roots = (0..6).map(|_| {
+            let at = [random.between(20.0, 60.0), random.between(-15.0, 15.0), 0.0];
+            random_node(&mut random, at, 10.0, 4)
+        });
+        let mut frame = TestFrame::new(tree(roots.collect()));
+        let whole = f64::from(leaf_triangles(&frame));
+        frame.target_ms = whole * random.between(0.2, 0.6);
+        let front = settled(&frame, &mut *policy(&[("slack", 0.0)]));
+
+        let mut gains = Gain::default();
+        gains.begin_frame(frame.tree.len(), 0.0);
+        let input = frame.input();
+        let all = 0..frame.tree.len() as u32;
+        let inner = all.filter(|&node| !frame.tree.children(node).is_empty());
+        let inner = inner.filter(|&node| input.is_visible(node));
+        let mut sum = 0.0;
+        let mut steps = Vec::new();
+        for node in inner {
+            let gain = gains.of(&input, node);
+            let is_refined = front.iter().any(|&drawn| is_below(&frame, drawn, node));
+            sum += if is_refined { gain } else { 0.0 };
+            steps.push((gain, refining_ms(&input, node)));
+        }
+        let roots_ms = front_ms(&input, frame.tree.roots());
+        let best = relaxed(steps, frame.target_ms - roots_ms);
+        assert!(sum <= best * (1.0 + 1e-9), "case {case}: {sum} of {best}");
+        assert!(sum > 0.9 * best, "case {case}: {sum} of {best}");
+    }
+}
+
+fn leaf_triangles(frame: &TestFrame) -> u32 {
+    let leaves = frame.tree.at(0..frame.tree.len() as u32).1.iter();
+    leaves.filter(|node| node.children.is_empty()).map(|node| node.triangles).sum()
+}
+
+fn is_below(frame: &TestFrame, mut node: u32, above: u32) -> bool {
+    while let Some(parent) = frame.tree.node(node).parent {
+        if parent == above {
+            return true;
+        }
+        node = parent;
+    }
+    false
+}
