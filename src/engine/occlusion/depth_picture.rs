@@ -21,7 +21,28 @@ pub(super) struct DepthPicture {
     eye: DVec3,
     /// Right and up, a metre being half of the picture at a depth of 1 m, and forward.
     axes: [DVec3; 3],
-    corners: Vec<Vec3>,
+    corners: Vec<Corner>,
+}
+
+/// A corner as the camera sees it.
+#[derive(Clone, Copy, Debug)]
+struct Corner {
+    /// Across, up and along the line of sight; half of the picture is 1 at a depth of 1 m.
+    at: Vec3,
+    /// Pixels from the left and from above; means nothing behind the near plane.
+    pixel: [f32; 2],
+}
+
+impl Corner {
+    fn new(at: Vec3) -> Self {
+        let half = SIZE.map(|pixels| pixels as f32 / 2.0);
+        let over = 1.0 / at.z;
+        Self { at, pixel: [(1.0 + at.x * over) * half[0], (1.0 - at.y * over) * half[1]] }
+    }
+
+    fn is_before(&self) -> bool {
+        self.at.z >= NEAR
+    }
 }
 
 impl DepthPicture {
@@ -50,7 +71,7 @@ impl DepthPicture {
         let mut corners = std::mem::take(&mut self.corners);
         corners.clear();
         corners.extend(occluder.positions.iter().map(|&at| {
-            Vec3::from_array(std::array::from_fn(|axis| axes[axis].dot(at) + offset[axis]))
+            Corner::new(Vec3::from_array([0, 1, 2].map(|axis| axes[axis].dot(at) + offset[axis])))
         }));
         for triangle in &occluder.triangles {
             self.draw_triangle(triangle.map(|corner| corners[corner as usize]));
@@ -58,16 +79,19 @@ impl DepthPicture {
         self.corners = corners;
     }
 
-    /// Draws a triangle by its corners, of which z is the depth.
-    fn draw_triangle(&mut self, corners: [Vec3; 3]) {
-        let Some([columns, rows]) = pixels_around(corners) else { return };
+    fn draw_triangle(&mut self, corners: [Corner; 3]) {
+        let [columns, rows] = pixels_around(&corners);
+        if columns.is_empty() || rows.is_empty() {
+            return;
+        }
+        let corners = corners.map(|corner| corner.at);
         // The ray through (x, y, 1) meets the triangle's plane where it is a sum of corners. These are
         // the parts of each, over the depth: no division by the corners' depths, some of which may be
         // behind the eye (Olano and Greer 1997).
         let crosses: [Vec3; 3] =
             std::array::from_fn(|i| corners[(i + 1) % 3].cross(corners[(i + 2) % 3]));
         let whole = corners[0].dot(crosses[0]);
-        if whole == 0.0 || columns.is_empty() {
+        if whole == 0.0 {
             return;
         }
         let parts = crosses.map(|cross| cross / whole);
@@ -103,33 +127,33 @@ impl DepthPicture {
     }
 }
 
-/// Columns and rows of pixels whose middles may be in a triangle; `None` where it is behind the eye.
-fn pixels_around(corners: [Vec3; 3]) -> Option<[Range<usize>; 2]> {
+/// Columns and rows of pixels whose middles may be in a triangle.
+fn pixels_around(corners: &[Corner; 3]) -> [Range<usize>; 2] {
     let [mut least, mut most] = [[f32::INFINITY; 2], [f32::NEG_INFINITY; 2]];
-    let mut add = |at: Vec3| {
-        for (axis, at) in [at.x / at.z, at.y / at.z].into_iter().enumerate() {
-            least[axis] = least[axis].min(at);
-            most[axis] = most[axis].max(at);
+    let mut add = |corner: &Corner| {
+        for axis in 0..2 {
+            least[axis] = least[axis].min(corner.pixel[axis]);
+            most[axis] = most[axis].max(corner.pixel[axis]);
         }
     };
-    for (index, &a) in corners.iter().enumerate() {
-        let b = corners[(index + 1) % 3];
-        if a.z >= NEAR {
+    for (index, a) in corners.iter().enumerate() {
+        let b = &corners[(index + 1) % 3];
+        if a.is_before() {
             add(a);
         }
-        if (a.z >= NEAR) != (b.z >= NEAR) {
-            let cut = a + (b - a) * ((NEAR - a.z) / (b.z - a.z));
-            add(Vec3 { z: NEAR, ..cut });
+        if a.is_before() != b.is_before() {
+            let cut = a.at + (b.at - a.at) * ((NEAR - a.at.z) / (b.at.z - a.at.z));
+            add(&Corner::new(Vec3 { z: NEAR, ..cut }));
         }
     }
-    // Rounding must not lose a pixel, and beyond the picture is beyond it.
-    let range = |from: f32, to: f32, pixels: usize| {
-        let place = |end: f32| (end.clamp(-1.0, 1.0) + 1.0) / 2.0 * pixels as f32;
-        (place(from) - 0.51).ceil().max(0.0) as usize
-            ..((place(to) + 0.51).floor() as usize).min(pixels)
-    };
-    let is_seen = (0..2).all(|axis| least[axis] <= 1.0 && most[axis] >= -1.0);
-    is_seen.then(|| [range(least[0], most[0], SIZE[0]), range(-most[1], -least[1], SIZE[1])])
+    // Middles are at halves; rounding must not lose one.
+    [0, 1].map(|axis| {
+        let clamped = |at: f32| at.clamp(0.0, SIZE[axis] as f32);
+        let (from, to) = (clamped(least[axis] - 0.51), clamped(most[axis] + 0.51));
+        // Not by `ceil`, which is a call where a processor may have no instruction for it.
+        let whole = from as usize;
+        whole + usize::from((whole as f32) < from)..to as usize
+    })
 }
 
 #[cfg(test)]
