@@ -223,12 +223,16 @@ impl GainOverPrice {
         is_enough.then_some(freed_ms)
     }
 
-    /// What is wanted in memory: the children of what is visited.
+    /// What is wanted in memory: the children of what is visited. What is there makes way only for what
+    /// ranks so much higher, as in the image.
     fn request(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
         out.requests.extend(frame.tree.roots().iter().map(|&root| (root, f64::MAX)));
         for &node in &self.visited {
             let rank = self.ranks[node as usize];
-            out.requests.extend(frame.tree.children(node).iter().map(|&child| (child, rank)));
+            out.requests.extend(frame.tree.children(node).iter().map(|&child| {
+                let is_there = frame.residents.contains(child);
+                (child, if is_there { rank } else { rank / self.options.hysteresis })
+            }));
         }
     }
 }

@@ -138,6 +138,23 @@ fn what_is_not_in_memory_is_asked_for_and_passed_over() {
     assert!(selection.requests.iter().any(|&(node, utility)| node == 1 && utility > 0.0));
 }
 
+#[test]
+fn what_is_in_memory_does_not_make_way_for_what_ranks_a_little_higher() {
+    let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), root(10.5, 0.1, 2)]));
+    frame.target_ms = 20.0;
+    let worth = |frame: &TestFrame, settings: &[(&str, f64)], node: u32| {
+        let requests = frame.select(&mut *policy(settings)).requests;
+        requests.into_iter().find(|&(asked, _)| asked == node).unwrap().1
+    };
+    frame.residents.set(1, false);
+    let (nearer, there) = (worth(&frame, &[], 1), worth(&frame, &[], 4));
+    assert!(nearer < there, "{nearer} {there}");
+    let without = [("hysteresis", 1.0)];
+    assert!(worth(&frame, &without, 1) > worth(&frame, &without, 4));
+    frame.residents.set(1, true);
+    assert!(worth(&frame, &[], 1) > there, "both in memory");
+}
+
 /// A node of 10 to 19 triangles with two or three children in its halves, down to a depth.
 fn random_node(random: &mut Random, at: [f64; 3], size: f64, depth: u32) -> Sketch {
     let count = if depth == 0 { 0 } else { 2 + random.below(2) };
