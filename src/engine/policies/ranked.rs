@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use crate::engine::{FrameInput, FrontLoad, Load, Selection, geometry_load};
 
 /// Milliseconds; nothing is free, so that gains can be divided by costs.
-pub(super) const LEAST_MS: f64 = 1e-6;
+const LEAST_MS: f64 = 1e-6;
 
 /// A node by rank; the lower number is first among equals.
 #[derive(Clone, Copy, Debug)]
@@ -44,14 +44,23 @@ pub(super) fn visible_children<'a>(
 
 /// Milliseconds that the children of a node in view take more than the node; more than 0.
 pub(super) fn refining_ms(frame: &FrameInput<'_>, node: u32) -> f64 {
+    added_ms(frame, node, visible_children(frame, node))
+}
+
+/// The same of all its children, whatever of them is in view.
+pub(super) fn wholly_refining_ms(frame: &FrameInput<'_>, node: u32) -> f64 {
+    added_ms(frame, node, frame.tree.children(node).iter().copied())
+}
+
+fn added_ms(frame: &FrameInput<'_>, node: u32, children: impl Iterator<Item = u32>) -> f64 {
     let load = |node: u32| geometry_load(frame.tree.node(node));
-    let mut children = Load::default();
-    for child in visible_children(frame, node).map(load) {
-        children.draws += child.draws;
-        children.vertices += child.vertices;
-        children.triangles += child.triangles;
+    let mut sum = Load::default();
+    for child in children.map(load) {
+        sum.draws += child.draws;
+        sum.vertices += child.vertices;
+        sum.triangles += child.triangles;
     }
-    (frame.costs.added_ms(&children) - frame.costs.added_ms(&load(node))).max(LEAST_MS)
+    (frame.costs.added_ms(&sum) - frame.costs.added_ms(&load(node))).max(LEAST_MS)
 }
 
 /// Counts what was visited outside of the view, once all requests are made.

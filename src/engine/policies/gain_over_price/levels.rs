@@ -35,6 +35,8 @@ const UNTOUCHED: Level =
 pub(super) struct Levels {
     now_s: f64,
     dwell_s: f64,
+    /// In the frame at hand.
+    have_changed: bool,
     nodes: Vec<Level>,
 }
 
@@ -42,7 +44,13 @@ impl Levels {
     pub fn begin_frame(&mut self, nodes: usize, dt_s: f64, options: &Options) {
         self.nodes.resize(nodes, UNTOUCHED);
         self.now_s += dt_s;
+        self.have_changed = false;
         self.dwell_s = options.dwell_s;
+    }
+
+    /// Whether any was chosen to change in this frame.
+    pub fn have_changed(&self) -> bool {
+        self.have_changed
     }
 
     pub fn is_refined(&self, node: u32) -> bool {
@@ -51,6 +59,7 @@ impl Levels {
 
     /// Its children stand for it.
     pub fn refine(&mut self, node: u32) {
+        self.have_changed = true;
         let level = &mut self.nodes[node as usize];
         (level.is_refined, level.changed_s) = (true, self.now_s);
     }
@@ -62,6 +71,7 @@ impl Levels {
 
     /// It stands for itself again, at a rank.
     pub fn coarsen(&mut self, node: u32, rank: f64, options: &Options) {
+        self.have_changed = true;
         let level = &mut self.nodes[node as usize];
         let is_back = self.now_s - level.changed_s < BACK_WITHIN_S;
         level.rest_s = match is_back {

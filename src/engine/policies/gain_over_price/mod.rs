@@ -16,10 +16,12 @@ mod tests;
 use std::collections::BinaryHeap;
 
 use super::parameter::{Parameter, info, parameter, with_settings};
-use super::ranked::{LEAST_MS, Ranked, count_culled, front_ms, refining_ms, visible_children};
+use super::ranked::{
+    Ranked, count_culled, front_ms, refining_ms, visible_children, wholly_refining_ms,
+};
 use super::{PolicyKind, Settings};
 use crate::Result;
-use crate::engine::{FrameInput, Policy, Selection, geometry_load};
+use crate::engine::{FrameInput, Policy, Selection};
 use gain::Gain;
 use levels::Levels;
 
@@ -89,7 +91,7 @@ struct GainOverPrice {
 
 impl GainOverPrice {
     fn rank(&mut self, frame: &FrameInput<'_>, node: u32) -> f64 {
-        self.gain.of(frame, node) / price(frame, node)
+        self.gain.of(frame, node) / wholly_refining_ms(frame, node)
     }
 
     /// Goes down what is refined and can stay so.
@@ -237,13 +239,6 @@ impl GainOverPrice {
     }
 }
 
-/// Milliseconds that all children of a node take more than it does, whatever of them is in view.
-fn price(frame: &FrameInput<'_>, node: u32) -> f64 {
-    let ms = |node: u32| frame.costs.added_ms(&geometry_load(frame.tree.node(node)));
-    let children = frame.tree.children(node).iter().map(|&child| ms(child));
-    (children.sum::<f64>() - ms(node)).max(LEAST_MS)
-}
-
 impl Policy for GainOverPrice {
     fn name(&self) -> &'static str {
         NAME
@@ -275,12 +270,14 @@ impl Policy for GainOverPrice {
         self.front_into(out);
         let ms = self.relieve(frame, front_ms(frame, &out.front));
         self.refine(frame, ms);
-        self.walk(frame);
-        self.front_into(out);
-        // Finer nodes also hide and cover other parts of the image, which none of them pays for.
-        self.relieve(frame, front_ms(frame, &out.front));
-        self.walk(frame);
-        self.front_into(out);
+        if self.levels.have_changed() {
+            self.walk(frame);
+            self.front_into(out);
+            // Finer nodes also hide and cover other parts of the image, which none of them pays for.
+            self.relieve(frame, front_ms(frame, &out.front));
+            self.walk(frame);
+            self.front_into(out);
+        }
         self.request(frame, out);
         count_culled(frame, out);
     }
@@ -288,7 +285,8 @@ impl Policy for GainOverPrice {
     fn utility(&self, frame: &FrameInput<'_>, node: u32) -> f64 {
         match frame.tree.node(node).parent {
             Some(parent) => {
-                self.options.away * Gain::anywhere(frame, parent) / price(frame, parent)
+                self.options.away * Gain::anywhere(frame, parent)
+                    / wholly_refining_ms(frame, parent)
             }
             None => f64::MAX,
         }
