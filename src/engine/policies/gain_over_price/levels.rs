@@ -1,6 +1,8 @@
 //! Which nodes are refined, since when, and how soon that may change.
 
 use super::Options;
+use crate::camera::Pose;
+use crate::engine::FrameInput;
 
 /// A node that is brought back to the level that it had within so many seconds rests longer each time.
 const BACK_WITHIN_S: f64 = 15.0;
@@ -25,10 +27,17 @@ struct Level {
     rest_s: f64,
     /// Its rank at that time.
     rank: f64,
+    /// Whether the camera stood still then.
+    was_still: bool,
 }
 
-const UNTOUCHED: Level =
-    Level { is_refined: false, changed_s: f64::NEG_INFINITY, rest_s: 0.0, rank: 0.0 };
+const UNTOUCHED: Level = Level {
+    is_refined: false,
+    changed_s: f64::NEG_INFINITY,
+    rest_s: 0.0,
+    rank: 0.0,
+    was_still: false,
+};
 
 /// The levels of all nodes.
 #[derive(Clone, Debug, Default)]
@@ -37,15 +46,26 @@ pub(super) struct Levels {
     dwell_s: f64,
     /// In the frame at hand.
     have_changed: bool,
+    pose: Option<Pose>,
+    /// When the camera moved last.
+    moved_s: f64,
     nodes: Vec<Level>,
 }
 
 impl Levels {
-    pub fn begin_frame(&mut self, nodes: usize, dt_s: f64, options: &Options) {
-        self.nodes.resize(nodes, UNTOUCHED);
-        self.now_s += dt_s;
+    pub fn begin_frame(&mut self, frame: &FrameInput<'_>, options: &Options) {
+        self.nodes.resize(frame.tree.len(), UNTOUCHED);
+        self.now_s += frame.dt_s;
+        if self.pose.replace(frame.view.pose) != Some(frame.view.pose) {
+            self.moved_s = self.now_s;
+        }
         self.have_changed = false;
         self.dwell_s = options.dwell_s;
+    }
+
+    /// Whether the camera has not moved for as long as nodes dwell.
+    fn is_still(&self) -> bool {
+        self.now_s - self.moved_s >= self.dwell_s
     }
 
     /// Whether any was chosen to change in this frame.
@@ -72,13 +92,15 @@ impl Levels {
     /// It stands for itself again, at a rank.
     pub fn coarsen(&mut self, node: u32, rank: f64, options: &Options) {
         self.have_changed = true;
+        let was_still = self.is_still();
         let level = &mut self.nodes[node as usize];
         let is_back = self.now_s - level.changed_s < BACK_WITHIN_S;
         level.rest_s = match is_back {
             true => (level.rest_s * LONGER).clamp(options.backoff_s, LONGEST_S),
             false => options.dwell_s,
         };
-        (level.is_refined, level.changed_s, level.rank) = (false, self.now_s, rank);
+        (level.is_refined, level.changed_s) = (false, self.now_s);
+        (level.rank, level.was_still) = (rank, was_still);
     }
 
     /// Whether a node that is refined was not long ago.
@@ -87,10 +109,12 @@ impl Levels {
     }
 
     /// Whether a node of this rank is not to be refined yet, where the least rank of those that are
-    /// is `least`.
+    /// is `least`. Once a camera that moved stands still, what it takes to draw does not change, and
+    /// nothing need rest.
     pub fn rests(&self, node: u32, rank: f64, least: f64) -> bool {
-        let Level { changed_s, rest_s, rank: then, .. } = self.nodes[node as usize];
+        let Level { changed_s, rest_s, rank: then, was_still, .. } = self.nodes[node as usize];
         let since_s = self.now_s - changed_s;
-        since_s < self.dwell_s || since_s < rest_s && rank < RISEN * then.min(least)
+        let may_rest = was_still || !self.is_still();
+        since_s < self.dwell_s || may_rest && since_s < rest_s && rank < RISEN * then.min(least)
     }
 }

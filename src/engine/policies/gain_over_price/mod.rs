@@ -250,7 +250,7 @@ impl Policy for GainOverPrice {
 
     fn select(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
         out.clear();
-        self.levels.begin_frame(frame.tree.len(), frame.dt_s, &self.options);
+        self.levels.begin_frame(frame, &self.options);
         self.gain.begin_frame(frame.tree.len(), frame.dt_s);
         self.ranks.resize(frame.tree.len(), 0.0);
         self.upgrades.clear();

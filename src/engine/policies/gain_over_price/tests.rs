@@ -109,6 +109,32 @@ fn a_camera_that_sways_comes_to_rest() {
     assert!(without.iter().all(|&at| at > 0), "{without:?}");
 }
 
+/// Frames until all is refined that there is time for, once a camera that swayed stands still, or
+/// moves on; no more than five seconds of them.
+fn frames_to_refine(stands: bool) -> usize {
+    let trees = (0..4).map(|at| root(10.0 + f64::from(at), 0.1, 2)).collect();
+    let mut frame = TestFrame::new(tree(trees));
+    let mut policy = policy(&[]);
+    let mut step = |frame: &mut TestFrame, moves: bool| {
+        let mut pose = frame.view.pose;
+        pose.position.y += if moves { 1e-3 } else { 0.0 };
+        frame.view = View::new(pose, frame.view.velocity, frame.view.size);
+        frame.front(&mut *policy).len()
+    };
+    for index in 0..720 {
+        frame.target_ms = if index % 180 < 90 { 80.0 } else { 60.0 };
+        step(&mut frame, true);
+    }
+    frame.target_ms = 80.0;
+    (0..150).take_while(|_| step(&mut frame, !stands) < 8).count()
+}
+
+#[test]
+fn who_stands_still_after_swaying_waits_for_no_detail() {
+    let [still, moving] = [true, false].map(frames_to_refine);
+    assert!(still <= 20 && moving == 150, "{still} {moving}");
+}
+
 #[test]
 fn what_was_out_of_view_is_drawn_as_it_was() {
     let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2)]));
