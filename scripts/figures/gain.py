@@ -6,7 +6,17 @@ import subprocess
 from collections import defaultdict
 from pathlib import Path
 
-from common import DOCS, Options, Programs, machine, real_data, run, say, table, write_between_markers
+from common import (
+    DOCS,
+    Options,
+    Programs,
+    machine,
+    real_data,
+    run,
+    say,
+    table,
+    write_between_markers,
+)
 
 SETS = [
     "ingolstadt",
@@ -21,9 +31,10 @@ CITY = {"blocks": 16, "triangles": 1_100_000}
 PATHS = ["walk", "fly", "rise", "orbit"]
 # A route that the comparison of policies does not take.
 SEED = "7"
+FRAMES = "900"
 # Triangles that take as long as a draw call.
 DRAW_CALL = 100
-# Fewer pixels than this are not worth an order.
+# In views where less FLIP than this can be gained, summed over pixels, any order will do.
 LEAST_GAIN = 500
 
 
@@ -94,14 +105,14 @@ def samples():
     inputs.update({name: real_data(name) for name in SETS})
     for name, models in inputs.items():
         if not models:
-            say(f"{name}: not there, left out")
             continue
         out, file = programs.work / f"gain-{name}", programs.work / f"gain-{name}.csv"
         run([programs.path("hlod-build"), "--quiet", *map(str, models), str(out)])
         paths = []
         for kind in PATHS:
             path = str(programs.work / f"gain-{name}-{kind}.csv")
-            make = ["make-path", str(out), "--kind", kind, "--seed", SEED, "--out", path]
+            make = ["make-path", str(out), "--kind", kind, "--seed", SEED]
+            make += ["--frames", FRAMES, "--out", path]
             run([programs.path("hlod-bench"), *make])
             paths.append(path)
         say(f"sampling {name}")

@@ -5,7 +5,7 @@ use super::{CostModel, FrameInput, Policy, Prices, Residents, Selection, Visibil
 use crate::camera::View;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::MemoryUse;
-use crate::runtime::test_tree::view;
+use crate::runtime::test_tree::{Sketch, sketch, tree, view};
 
 /// A tree from a camera at the origin, all of it in memory, 10 ms a frame, 1 ms for each triangle.
 pub(crate) struct TestFrame {
@@ -76,6 +76,26 @@ impl TestFrame {
         front.sort_unstable();
         front
     }
+}
+
+/// A root at a distance, with children of 10 triangles each; refining it takes 10 ms for every
+/// child after the first.
+pub(crate) fn root(distance: f64, error: f64, children: usize) -> Sketch {
+    let at = [distance + 1.0, 0.0, 0.0];
+    let children = (0..children).map(|_| sketch(at, 1.0, vec![])).collect();
+    Sketch { error, ..sketch(at, 1.0, children) }
+}
+
+/// For policies that go by gain over price: of two nodes, what the nearer gains is not in memory.
+pub(crate) fn passes_over_what_is_not_in_memory(policy: &mut dyn Policy) {
+    let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), root(40.0, 0.1, 2)]));
+    frame.residents.set(1, false);
+    frame.target_ms = 30.0;
+    let selection = frame.select(policy);
+    let mut front = selection.front.clone();
+    front.sort_unstable();
+    assert_eq!(front, [0, 4, 5]);
+    assert!(selection.requests.iter().any(|&(node, utility)| node == 1 && utility > 0.0));
 }
 
 /// Settings by which a policy's counters go from one end to the other within a minute rather than

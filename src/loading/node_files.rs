@@ -84,18 +84,8 @@ impl NodeFiles {
 
     fn decode(&self, reading: Reading) -> Result<Arrival> {
         let Reading { node, files, textures, bytes, .. } = reading;
-        let entry = &self.scene.nodes[node as usize];
-        let (path, size) = &files[0];
-        let (glb, mut rest) = bytes.split_at_checked(*size as usize).ok_or_else(|| {
-            Error::input(path, format!("expected {size} bytes, found {}", bytes.len()))
-        })?;
-        let found = file_crc(glb);
-        if found != entry.file_crc {
-            return Err(Error::input(
-                path,
-                format!("damaged: expected CRC-32 {:08x}, found {found:08x}", entry.file_crc),
-            ));
-        }
+        let (path, _) = &files[0];
+        let (glb, mut rest) = self.checked(node, path, &bytes)?;
         let content = Content::decode(path, glb, |name| self.textures.get(name).copied())?;
         let mut pictures = Vec::with_capacity(textures.len());
         for (&texture, (path, size)) in textures.iter().zip(&files[1..]) {
@@ -109,13 +99,30 @@ impl NodeFiles {
         Ok(Arrival { node, content, pictures })
     }
 
+    /// The bytes of a node's file, checked, and those after it.
+    fn checked<'a>(&self, node: u32, path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], &'a [u8])> {
+        let entry = &self.scene.nodes[node as usize];
+        let size = entry.file_bytes;
+        let (glb, rest) = bytes.split_at_checked(size as usize).ok_or_else(|| {
+            Error::input(path, format!("expected {size} bytes, found {}", bytes.len()))
+        })?;
+        let found = file_crc(glb);
+        if found != entry.file_crc {
+            return Err(Error::input(
+                path,
+                format!("damaged: expected CRC-32 {:08x}, found {found:08x}", entry.file_crc),
+            ));
+        }
+        Ok((glb, rest))
+    }
+
     /// Reads the geometry of a node alone: its pictures stay encoded.
     pub fn read_mesh(&self, node: u32) -> Result<NodeMesh> {
         let mut reading = self.begin(node, |_| true);
         let bytes = reading.left();
         reading.read(bytes)?;
         let path = reading.path().to_owned();
-        guarded(path.clone(), || read_glb(&reading.bytes, &path))
+        guarded(path.clone(), || read_glb(self.checked(node, &path, &reading.bytes)?.0, &path))
     }
 
     /// Reads and decodes a node in one go.

@@ -229,16 +229,8 @@ impl Policy for BestFirst {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::test_frame::TestFrame;
-    use crate::runtime::test_tree::{Sketch, sketch, tree};
-
-    /// A root at a distance, with children of 10 triangles each; refining it takes 10 ms for every
-    /// child after the first.
-    fn root(distance: f64, error: f64, children: usize) -> Sketch {
-        let at = [distance + 1.0, 0.0, 0.0];
-        let children = (0..children).map(|_| sketch(at, 1.0, vec![])).collect();
-        Sketch { error, ..sketch(at, 1.0, children) }
-    }
+    use crate::engine::test_frame::{TestFrame, passes_over_what_is_not_in_memory, root};
+    use crate::runtime::test_tree::tree;
 
     fn policy(settings: &[(&str, f64)]) -> Box<dyn Policy> {
         KIND.make(&settings.iter().map(|&(name, value)| (name.into(), value)).collect()).unwrap()
@@ -264,14 +256,7 @@ mod tests {
 
     #[test]
     fn what_is_not_in_memory_is_asked_for_and_passed_over() {
-        let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), root(40.0, 0.1, 2)]));
-        frame.residents.set(1, false);
-        frame.target_ms = 30.0;
-        let selection = frame.select(&mut *policy(&[]));
-        let mut front = selection.front.clone();
-        front.sort_unstable();
-        assert_eq!(front, [0, 4, 5]);
-        assert!(selection.requests.iter().any(|&(node, utility)| node == 1 && utility > 0.0));
+        passes_over_what_is_not_in_memory(&mut *policy(&[]));
     }
 
     #[test]
