@@ -106,7 +106,7 @@ def samples():
     for name, models in inputs.items():
         if not models:
             continue
-        out, file = programs.work / f"gain-{name}", programs.work / f"gain-{name}.csv"
+        out, file = programs.work / f"gain-{name}-out", programs.work / f"gain-{name}.csv"
         run([programs.path("hlod-build"), "--quiet", *map(str, models), str(out)])
         paths = []
         for kind in PATHS:
