@@ -85,7 +85,9 @@ pub struct FrameSample<'a> {
     pub view: &'a View,
     /// What was drawn.
     pub front: &'a [u32],
-    /// What was drawn in the frame before, where levels toggled since.
+    /// The rest of the front, which was not drawn since this hides it.
+    pub hidden: &'a [u32],
+    /// The front of the frame before, where levels toggled since.
     pub before: Option<&'a [u32]>,
     /// The picture, alpha 0 where nothing was drawn; `None` where the run drew none.
     pub drawn: Option<RgbaImage>,

@@ -5,6 +5,7 @@ mod clock;
 mod compare;
 mod model_backend;
 mod model_load;
+mod model_occlusions;
 #[cfg(feature = "render")]
 mod node_cache;
 mod options;
@@ -28,6 +29,7 @@ pub use accuracy::{Accuracy, FrameInspector, FrameSample, ReferenceContext, Wors
 pub use clock::{CLOCK_FILE_VERSION, ClockConstants};
 pub use compare::{Comparison, Limit, Limits, Row, SummaryFile, Unit, compare};
 pub use model_backend::ModelBackend;
+pub use model_occlusions::ModelOcclusions;
 pub use options::{BenchOptions, Pace, PolicyChoice, Size};
 pub use record::FrameRecord;
 #[cfg(feature = "render")]

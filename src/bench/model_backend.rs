@@ -6,13 +6,13 @@
 //! machine has units for both, what is new is slower in its first frame, times scatter, and now and
 //! then the whole machine stalls.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use super::ClockConstants;
 use super::model_load::TileLoad;
+use super::model_occlusions::ModelOcclusions;
 use crate::camera::View;
-use crate::engine::lock;
-use crate::engine::{Backend, Drawn};
+use crate::engine::{Backend, Drawn, NodeOcclusion, lock};
 use crate::random::Random;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::{Changes, Residency};
@@ -32,6 +32,7 @@ pub struct ModelBackend<'a> {
     /// Bytes that loading had time for and did not read, or the other way round below 0.
     credit: f64,
     load: TileLoad,
+    occlusions: Option<Arc<ModelOcclusions>>,
 }
 
 impl<'a> ModelBackend<'a> {
@@ -46,7 +47,13 @@ impl<'a> ModelBackend<'a> {
             dt_s: 0.0,
             credit: 0.0,
             load: TileLoad::default(),
+            occlusions: None,
         }
+    }
+
+    /// Knows what nodes hide: that alone is read from files.
+    pub fn with_occlusions(self, occlusions: Arc<ModelOcclusions>) -> Self {
+        Self { occlusions: Some(occlusions), ..self }
     }
 
     /// What a frame takes by chance: a factor, and milliseconds.
@@ -93,6 +100,10 @@ impl Backend for ModelBackend<'_> {
         self.frames += 1;
         let draw_ms = factor * (prices.frame + both + cold) + stall_ms;
         Ok(Drawn { draw_ms, gpu_ms: None })
+    }
+
+    fn occlusion(&mut self, node: u32) -> Option<Arc<NodeOcclusion>> {
+        self.occlusions.as_ref()?.of(node)
     }
 
     fn end_frame(

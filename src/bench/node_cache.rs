@@ -163,7 +163,7 @@ impl<R: BorrowMut<Renderer>> NodeCache<R> {
     /// Copies a node to the graphics card, in the place of one that was there; false where a shared picture is missing that could not
     /// be read with the node that it should have come with.
     pub fn hold(&mut self, arrival: &Arrival) -> Result<bool> {
-        let &Arrival { node, ref content, ref pictures } = arrival;
+        let &Arrival { node, ref content, ref pictures, .. } = arrival;
         for (texture, picture) in pictures {
             self.renderer.borrow_mut().upload_shared(*texture, picture)?;
             if self.textures.insert(*texture, 0).is_none() {

@@ -22,6 +22,8 @@ pub struct BenchOptions {
     pub size: Size,
     /// Frames for which the camera stands at the first pose before the log begins.
     pub warm_up_frames: u64,
+    /// Whether what is hidden by what is before it is left out.
+    pub cull_hidden: bool,
     /// Seed of the model clock's noise and stalls.
     pub seed: u64,
 }
@@ -35,6 +37,7 @@ impl Default for BenchOptions {
             pace: Pace::default(),
             size: Size::default(),
             warm_up_frames: 0,
+            cull_hidden: true,
             seed: 0,
         }
     }

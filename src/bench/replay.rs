@@ -51,6 +51,9 @@ pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -
     if let Some(occluders) = occluders {
         engine.look_past(occluders);
     }
+    if options.cull_hidden {
+        engine.cull_hidden(tree.near_plane().into());
+    }
     let view =
         |index: usize| View::new(path.frames[index].pose, path.velocity(index), options.size.0);
     let interval_s = |index: usize| match options.pace {
@@ -75,10 +78,12 @@ pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -
         engine.logged(index as u64)?;
         let toggled = record.report.toggles() > 0;
         if let Some(inspector) = inspector.as_mut().filter(|at| at.wants(index, toggled)) {
-            let (front, before) = (engine.front().to_vec(), engine.front_before().to_vec());
+            let (front, before) = (engine.drawn().to_vec(), engine.front_before().to_vec());
+            let hidden = engine.hidden();
             let (front, before) = (&front[..], toggled.then_some(&before[..]));
             engine.inspect(&view, &mut |drawn| {
-                let sample = FrameSample { frame: record.frame, view: &view, front, before, drawn };
+                let (frame, hidden) = (record.frame, &hidden[..]);
+                let sample = FrameSample { frame, view: &view, front, hidden, before, drawn };
                 record.accuracy = Some(inspector.inspect(sample)?);
                 Ok(())
             })?;

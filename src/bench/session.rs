@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock};
 
 use super::{
-    BenchOptions, ClockConstants, Context, FrameInspector, FrameRecord, ModelBackend, Replay, Run,
-    run,
+    BenchOptions, ClockConstants, Context, FrameInspector, FrameRecord, ModelBackend,
+    ModelOcclusions, Replay, Run, run,
 };
 use crate::Result;
 use crate::camera::CameraPath;
@@ -24,6 +24,8 @@ pub struct Session {
     tree: SceneTree,
     /// Read where a policy first asks for it.
     occluders: OnceLock<Arc<Occluders>>,
+    /// For runs in which nothing is drawn.
+    occlusions: Arc<ModelOcclusions>,
 }
 
 impl Session {
@@ -31,7 +33,8 @@ impl Session {
     pub fn open(dir: &Path) -> Result<Self> {
         let scene = Arc::new(Scene::read(dir)?.breadth_first());
         let tree = SceneTree::new(&scene);
-        Ok(Self { dir: dir.to_owned(), scene, tree, occluders: OnceLock::new() })
+        let occlusions = Arc::new(ModelOcclusions::new(NodeFiles::new(dir, Arc::clone(&scene))));
+        Ok(Self { dir: dir.to_owned(), scene, tree, occluders: OnceLock::new(), occlusions })
     }
 
     /// The scene.
@@ -108,7 +111,8 @@ impl Session {
         let tree = self.tree_for(&constants);
         let context = Context { constants, ..self.context(options.clone(), path, &*policy) };
         let occluders = self.occluders(&*policy);
-        let mut backend = ModelBackend::new(&tree, constants, options.seed);
+        let mut backend = ModelBackend::new(&tree, constants, options.seed)
+            .with_occlusions(Arc::clone(&self.occlusions));
         let replay = Replay {
             tree: &tree,
             path,
@@ -165,7 +169,7 @@ impl Session {
         let occluders = self.occluders(&*policy);
         let mut backend = super::GpuBackend::new(
             &tree,
-            self.files(),
+            if options.cull_hidden { self.files().with_occlusion() } else { self.files() },
             renderer,
             Arc::clone(&residency),
             snapshots,

@@ -138,6 +138,11 @@ pub fn summary(run: &Run, context: &Context) -> Value {
             "mean": mean(of(|frame| frame.report.select_ms)),
             "max": percentile(&of(|frame| frame.report.select_ms), 100.0),
         },
+        // Of the front, and not drawn.
+        "hidden": {
+            "nodes_mean": mean(of(|frame| f64::from(frame.report.hidden_nodes))),
+            "triangles_mean": mean(of(|frame| frame.report.hidden_triangles as f64)),
+        },
         "visited_mean": mean(of(|frame| f64::from(frame.report.visited))),
         "nodes_mean": mean(of(|frame| f64::from(frame.report.nodes))),
         "triangles_mean": mean(of(|frame| frame.report.triangles as f64)),
@@ -294,6 +299,17 @@ pub fn summary_text(summary: &Value) -> String {
             number("/select_ms/mean")
         ),
     );
+    if number("/hidden/nodes_mean") > 0.0 {
+        let hidden = number("/hidden/triangles_mean");
+        line(
+            "hidden",
+            format!(
+                "{:.1} nodes and {hidden:.0} triangles a frame, {:.0} % of those in view, not drawn",
+                number("/hidden/nodes_mean"),
+                100.0 * hidden / (hidden + number("/triangles_mean"))
+            ),
+        );
+    }
     line(
         "memory",
         format!(

@@ -1,11 +1,12 @@
 //! Where frames are drawn and how time passes.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use image::RgbaImage;
 
 use crate::Result;
 use crate::camera::View;
+use crate::engine::NodeOcclusion;
 use crate::runtime::residency::{Changes, Residency};
 
 /// Where frames are drawn and how time passes: a graphics adapter and the clock on the wall, or a
@@ -22,6 +23,13 @@ pub trait Backend {
 
     /// Draws nodes; milliseconds that it took.
     fn draw(&mut self, front: &[u32], view: &View) -> Result<Drawn>;
+
+    /// What a node hides that has just been loaded, and how it may be hidden; asked for once. `None`
+    /// where that is not known.
+    fn occlusion(&mut self, node: u32) -> Option<Arc<NodeOcclusion>> {
+        let _ = node;
+        None
+    }
 
     /// The priorities of a frame were set: loading may go on.
     fn priorities_set(&mut self) {}

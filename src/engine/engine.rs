@@ -7,8 +7,8 @@ use super::predict::predict;
 use super::steady::Steady;
 use super::{
     Backend, CostModel, FrameEstimate, FrameInput, FrameOutcome, FrameReport, FrontCheck,
-    FrontLoad, Inspect, Load, Occluders, Policy, PredictedView, Residents, SeenAreas, Selection,
-    ToggleCauses, Visibility,
+    FrontLoad, HiddenNodes, Inspect, Load, Occluders, Policy, PredictedView, Residents, SeenAreas,
+    Selection, ToggleCauses, Visibility,
 };
 use crate::camera::{Pose, View};
 use crate::runtime::residency::{Changes, Counters, MemoryUse, Residency};
@@ -20,6 +20,7 @@ struct Seen<'a> {
     tree: &'a SceneTree,
     visibility: Visibility,
     seen: Option<SeenAreas>,
+    hidden: Option<HiddenNodes>,
     predicted: Vec<PredictedView>,
     residents: Residents,
     memory: MemoryUse,
@@ -36,6 +37,7 @@ impl Seen<'_> {
             view,
             visibility: &self.visibility,
             seen: self.seen.as_ref(),
+            hidden: self.hidden.as_ref(),
             predicted: &self.predicted,
             residents: &self.residents,
             memory: self.memory,
@@ -56,8 +58,9 @@ pub struct Engine<'a> {
     costs: CostModel,
     margin: Margin,
     front_load: FrontLoad,
-    /// What the frame before drew.
-    drawn: Load,
+    /// What the frame before drew, and took.
+    drawn: Vec<u32>,
+    load: Load,
     /// The camera of the frame before.
     pose: Option<Pose>,
     selection: Selection,
@@ -100,6 +103,7 @@ impl<'a> Engine<'a> {
                 tree,
                 visibility: Visibility::default(),
                 seen: None,
+                hidden: None,
                 predicted: Vec::new(),
                 residents: Residents::none(tree.len()),
                 memory,
@@ -113,7 +117,8 @@ impl<'a> Engine<'a> {
             costs,
             margin: Margin::default(),
             front_load: FrontLoad::default(),
-            drawn: Load::default(),
+            drawn: Vec::new(),
+            load: Load::default(),
             pose: None,
             selection: Selection::default(),
             before: Vec::new(),
@@ -135,6 +140,15 @@ impl<'a> Engine<'a> {
         }
     }
 
+    /// Draws nothing that what is before it hides; nothing nearer than `near` metres is drawn.
+    pub fn cull_hidden(&mut self, near: f64) {
+        let mut hidden = HiddenNodes::new(self.seen.tree.len(), near);
+        for &root in self.seen.tree.roots() {
+            hidden.set(root, self.backend.occlusion(root));
+        }
+        self.seen.hidden = Some(hidden);
+    }
+
     /// Draws a frame. The next begins `interval_s` seconds after this one began, at the earliest.
     pub fn frame(&mut self, view: &View, interval_s: f64) -> Result<FrameReport> {
         self.before.clone_from(&self.selection.front);
@@ -142,20 +156,29 @@ impl<'a> Engine<'a> {
 
         let changes = self.begin_frame(&mut report)?;
         report.upload_ms = self.backend.apply(&changes)?;
+        self.hold_occlusion(&changes);
         let seen = &mut self.seen;
         predict(self.pose.as_ref(), view, seen.dt_s, &mut seen.predicted);
         seen.visibility.begin_frame(seen.tree.len());
         let is_still = changes.arrived.is_empty() && self.pose == Some(view.pose);
-        seen.steady.follow(&self.costs, self.margin.ratio(), &self.drawn, is_still);
+        seen.steady.follow(&self.costs, self.margin.ratio(), &self.load, is_still);
 
         let before = self.backend.now_ms();
         let dt_s = self.seen.dt_s;
         if let Some(seen) = &mut self.seen.seen {
             seen.look(view, dt_s);
         }
+        if let Some(hidden) = &mut self.seen.hidden {
+            hidden.begin_frame(view, dt_s);
+        }
         self.policy.select(&self.seen.from(view), &mut self.selection);
-        report.select_ms = self.backend.now_ms() - before;
         let front = &self.selection.front;
+        self.drawn.clear();
+        match &mut self.seen.hidden {
+            Some(hidden) => self.drawn.extend(hidden.drawn(self.seen.tree, front, view)),
+            None => self.drawn.extend(front),
+        }
+        report.select_ms = self.backend.now_ms() - before;
         self.check.check(self.seen.tree, front, view, &self.seen.residents).map_err(|fault| {
             let (policy, frame) = (self.policy.name(), self.frames);
             Error::Internal(format!("policy {policy}, frame {frame}: {fault}"))
@@ -163,7 +186,7 @@ impl<'a> Engine<'a> {
         self.set_requests(view, &mut report)?;
         self.backend.priorities_set();
 
-        let drawn = self.backend.draw(&self.selection.front, view)?;
+        let drawn = self.backend.draw(&self.drawn, view)?;
         (report.draw_ms, report.gpu_ms) = (drawn.draw_ms, drawn.gpu_ms);
         report.actual_ms = report.select_ms + report.draw_ms;
         report.frame_ms = report.actual_ms + report.upload_ms;
@@ -197,11 +220,17 @@ impl<'a> Engine<'a> {
         Ok(changes)
     }
 
+    /// Knows what the nodes in memory hide, and of no others.
+    fn hold_occlusion(&mut self, changes: &Changes) {
+        let Some(hidden) = &mut self.seen.hidden else { return };
+        changes.left.iter().for_each(|&node| hidden.set(node, None));
+        changes.arrived.iter().for_each(|&node| hidden.set(node, self.backend.occlusion(node)));
+    }
+
     /// Sets what was expected of a frame beside what it took, and learns from it.
     fn estimate(&mut self, view: &View, changes: &Changes, report: &mut FrameReport) {
-        let front = &self.selection.front;
         let (costs, &Seen { tree, dt_s, .. }) = (&mut self.costs, &self.seen);
-        let whole = self.front_load.of(tree, front, view, changes.arrived_bytes);
+        let whole = self.front_load.of(tree, &self.drawn, view, changes.arrived_bytes);
         let drawn = Load { uploaded_bytes: 0.0, ..whole };
         let modelled = costs.estimate(&whole);
         (report.modelled_ms, report.modelled_deviation_ms) =
@@ -214,22 +243,28 @@ impl<'a> Engine<'a> {
         report.estimated_without_feedback_ms = estimate.without_feedback_ms;
         self.margin.observe(costs.priced_ms(&drawn), report.frame_ms, dt_s);
         costs.observe(&whole, report.frame_ms, report.gpu_ms, dt_s);
-        self.drawn = drawn;
+        self.load = drawn;
     }
 
     /// Nodes that the last frame drew.
-    pub fn front(&self) -> &[u32] {
-        &self.selection.front
+    pub fn drawn(&self) -> &[u32] {
+        &self.drawn
     }
 
-    /// Nodes that the frame before it drew.
+    /// Nodes of its front that it did not draw, since those drawn hide them.
+    pub fn hidden(&self) -> Vec<u32> {
+        let is_hidden = |node: &u32| !self.drawn.contains(node);
+        self.selection.front.iter().copied().filter(is_hidden).collect()
+    }
+
+    /// The front of the frame before it.
     pub fn front_before(&self) -> &[u32] {
         &self.before
     }
 
     /// Pauses loading while the last frame is inspected, with its image where there is one.
     pub fn inspect(&mut self, view: &View, inspect: &mut Inspect<'_>) -> Result<()> {
-        self.backend.pause_for(&self.selection.front, view, inspect)
+        self.backend.pause_for(&self.drawn, view, inspect)
     }
 
     /// Frame `frame` of a path was logged: a time for what must not be timed.
@@ -275,10 +310,15 @@ impl<'a> Engine<'a> {
         let selection = &self.selection;
         report.diagnostics.clone_from(&selection.diagnostics);
         (report.visited, report.culled) = (selection.visited() as u32, selection.culled);
-        report.nodes = selection.front.len() as u32;
+        report.nodes = self.drawn.len() as u32;
+        report.hidden_nodes = selection.front.len() as u32 - report.nodes;
+        let triangles = |nodes: &[u32]| -> u64 {
+            nodes.iter().map(|&node| u64::from(self.seen.tree.node(node).triangles)).sum()
+        };
+        report.hidden_triangles = triangles(&selection.front) - triangles(&self.drawn);
         report.nodes_by_level = vec![0; self.levels];
         report.triangles_by_level = vec![0; self.levels];
-        for &node in &selection.front {
+        for &node in &self.drawn {
             let node = self.seen.tree.node(node);
             report.triangles += u64::from(node.triangles);
             report.nodes_by_level[node.level as usize] += 1;
@@ -288,7 +328,11 @@ impl<'a> Engine<'a> {
         (report.toggles_up, report.toggles_down) = (toggles.up, toggles.down);
         let frame = self.seen.from(view);
         report.toggle_causes = ToggleCauses::of(&frame, &self.toggles, changes);
-        report.finer_resident = selection.front.iter().any(|&node| frame.can_refine(node));
+        report.finer_resident = self.drawn.iter().any(|&node| frame.can_refine(node));
+        if let Some(hidden) = &mut self.seen.hidden {
+            let all = report.triangles + report.hidden_triangles;
+            hidden.saved(report.hidden_triangles as f64 / all.max(1) as f64);
+        }
     }
 
     fn count(&mut self, report: &mut FrameReport) -> Result<()> {

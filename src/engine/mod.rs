@@ -30,7 +30,7 @@ pub use check_front::{FrontCheck, FrontFault, FrontRule};
 pub use cost_model::{CostModel, Estimate, Load, Prices};
 pub use engine::{Engine, lock};
 pub use frame_load::{FrontLoad, geometry_load};
-pub use occlusion::{Occluders, SeenAreas};
+pub use occlusion::{HiddenNodes, NodeOcclusion, Occluders, SeenAreas};
 pub use policy::{FrameEstimate, FrameInput, FrameOutcome, Policy, PredictedView, Selection};
 pub use report::FrameReport;
 pub use residents::Residents;

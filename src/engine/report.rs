@@ -39,6 +39,10 @@ pub struct FrameReport {
     pub nodes: u32,
     /// Triangles drawn.
     pub triangles: u64,
+    /// Nodes of the front that were not drawn, since what was drawn hides them.
+    pub hidden_nodes: u32,
+    /// Triangles of these.
+    pub hidden_triangles: u64,
     /// Nodes visited by selection.
     pub visited: u32,
     /// Of these, nodes outside of the view.

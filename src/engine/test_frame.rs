@@ -54,6 +54,7 @@ impl TestFrame {
             view: &self.view,
             visibility: &self.visibility,
             seen: None,
+            hidden: None,
             predicted: &[],
             residents: &self.residents,
             memory: self.memory,

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
+use crate::engine::NodeOcclusion;
 use crate::format::{NODES_DIR, NodeMesh, Scene, TEXTURES_DIR, file_crc, read_glb};
 use crate::render::content::{Content, Picture};
 use crate::{Error, Result};
@@ -18,6 +19,7 @@ pub struct NodeFiles {
     dir: PathBuf,
     scene: Arc<Scene>,
     textures: FxHashMap<String, u32>,
+    with_occlusion: bool,
 }
 
 /// A node that was read and decoded.
@@ -29,6 +31,8 @@ pub struct Arrival {
     pub content: Content,
     /// Shared pictures that were not in memory when its load began, by index.
     pub pictures: Vec<(u32, Picture)>,
+    /// What it hides, and how it may be hidden, where that is [asked for](NodeFiles::with_occlusion).
+    pub occlusion: Option<NodeOcclusion>,
 }
 
 /// The files of one node, half read.
@@ -52,7 +56,12 @@ impl NodeFiles {
             .zip(0..)
             .map(|(texture, index)| (texture.file_name.clone(), index))
             .collect();
-        Self { dir: dir.to_owned(), scene, textures }
+        Self { dir: dir.to_owned(), scene, textures, with_occlusion: false }
+    }
+
+    /// Has nodes arrive with what they hide.
+    pub fn with_occlusion(self) -> Self {
+        Self { with_occlusion: true, ..self }
     }
 
     /// The scene.
@@ -96,7 +105,10 @@ impl NodeFiles {
             pictures.push((texture, Picture::decode(path, bytes, [entry.width, entry.height])?));
             rest = after;
         }
-        Ok(Arrival { node, content, pictures })
+        let occlusion =
+            || -> Result<_> { Ok(NodeOcclusion::new(&read_glb(glb, path)?, self.scene.up)) };
+        let occlusion = self.with_occlusion.then(occlusion).transpose()?;
+        Ok(Arrival { node, content, pictures, occlusion })
     }
 
     /// The bytes of a node's file, checked, and those after it.

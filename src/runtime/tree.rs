@@ -165,6 +165,11 @@ impl SceneTree {
         view.pixels_per_metre() / distance
     }
 
+    /// Metres of the nearest that is drawn: a hand's breadth, and less in scenes of a few metres.
+    pub fn near_plane(&self) -> f32 {
+        ((self.diagonal() * 1e-4) as f32).clamp(1e-6, 0.1)
+    }
+
     /// Length of the diagonal of the box around everything, metres.
     pub fn diagonal(&self) -> f64 {
         self.bounds[0].distance(self.bounds[1])

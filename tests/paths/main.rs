@@ -22,6 +22,7 @@ mod rays;
 #[allow(dead_code)]
 mod support;
 mod surfaces;
+mod visibility;
 
 use adapter::or_skip;
 use picture::{SIZE, part_with_model};
@@ -35,6 +36,8 @@ const SPARSE: [&str; 2] = ["lyon_roads", "wageningen"];
 /// The part of the pictures of a path that may show less there, and what these show at least.
 const SPARSE_FEW: f64 = 0.02;
 const SPARSE_LEAST_PART: f64 = 0.2;
+/// Sets in which much is hidden: of the others little is, or of some paths only.
+const HIDING: [&str; 2] = ["hamada", "wageningen"];
 /// Of so many frames one is drawn.
 const DRAWN: usize = 12;
 /// Seeds of the paths.
@@ -85,7 +88,13 @@ fn check_scene(set: &str, out: &Path) {
             }
         }
     }
-    assert!(faults.is_empty(), "{set}: {faults:#?}");
+    drop(renderer);
+    let options = RenderOptions { size: visibility::SIZE, ..RenderOptions::default() };
+    let mut renderer = ReferenceRenderer::new(&session, &options, CAP_BYTES).unwrap();
+    let (hidden, differ) = visibility::hidden_and_faults(&session, &ground, &mut renderer);
+    faults.extend(differ);
+    let is_enough = hidden > 500 || !HIDING.contains(&set);
+    assert!(faults.is_empty() && is_enough, "{set}: {hidden} nodes hidden, {faults:#?}");
 }
 
 /// A test for each set, so that they run side by side.

@@ -102,7 +102,7 @@ impl FrameInspector for Reference {
     }
 
     fn inspect(&mut self, sample: FrameSample<'_>) -> Result<Accuracy> {
-        let FrameSample { frame, view, front, before, drawn } = sample;
+        let FrameSample { frame, view, front, before, drawn, .. } = sample;
         let pose = &view.pose;
         let drawn = match drawn {
             Some(drawn) => drawn,

@@ -6,7 +6,6 @@ use image::RgbaImage;
 
 use crate::bench::node_cache::NodeCache;
 use crate::bench::session::Session;
-use crate::bench::wall::near_plane;
 use crate::camera::Pose;
 use crate::render::{AdapterLabel, RenderOptions, Renderer};
 use crate::runtime::SceneTree;
@@ -30,7 +29,7 @@ impl ReferenceRenderer {
         let renderer = Renderer::new(&RenderOptions { keep_depths: true, ..options.clone() })?;
         let (tree, files) = (session.tree().clone(), session.files());
         Ok(Self {
-            near: near_plane(&tree),
+            near: tree.near_plane(),
             cache: NodeCache::new(tree, files, renderer, cap_bytes),
             broken: BTreeMap::new(),
         })

@@ -6,8 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::{Snapshots, process};
 use crate::camera::View;
-use crate::engine::lock;
-use crate::engine::{Backend, Drawn, Inspect};
+use crate::engine::{Backend, Drawn, Inspect, NodeOcclusion, lock};
 use crate::loading::{Arrival, LoadingThread, NodeFiles};
 use crate::render::Renderer;
 use crate::runtime::SceneTree;
@@ -27,6 +26,8 @@ pub struct GpuBackend<'a> {
     residency: Arc<Mutex<Residency>>,
     /// Decoded, and not yet resident.
     arrived: BTreeMap<u32, Arrival>,
+    /// What nodes hide that were uploaded, until it is asked for.
+    occlusions: BTreeMap<u32, NodeOcclusion>,
     /// Files that cannot be used, each once.
     broken: Vec<String>,
     snapshots: Option<Snapshots>,
@@ -45,7 +46,7 @@ impl<'a> GpuBackend<'a> {
         residency: Arc<Mutex<Residency>>,
         snapshots: Option<Snapshots>,
     ) -> Self {
-        let near = near_plane(tree);
+        let near = tree.near_plane();
         let now = Instant::now();
         Self {
             tree,
@@ -54,6 +55,7 @@ impl<'a> GpuBackend<'a> {
             thread: None,
             residency,
             arrived: BTreeMap::new(),
+            occlusions: BTreeMap::new(),
             broken: Vec::new(),
             snapshots,
             near,
@@ -98,11 +100,6 @@ fn report(broken: &mut Vec<String>, error: &Error) {
     }
 }
 
-/// Metres of the nearest that is seen: a hand's breadth, and less in scenes of a few metres.
-pub(in crate::bench) fn near_plane(tree: &SceneTree) -> f32 {
-    ((tree.diagonal() * 1e-4) as f32).clamp(1e-6, 0.1)
-}
-
 impl Backend for GpuBackend<'_> {
     fn load_roots(&mut self, residency: &Mutex<Residency>, roots: &[u32]) -> Result<()> {
         for &root in roots {
@@ -135,6 +132,9 @@ impl Backend for GpuBackend<'_> {
                 Error::Internal(format!("node {node} was said to be loaded and is not there"))
             })?;
             self.upload(&arrival)?;
+            if let Some(occlusion) = arrival.occlusion {
+                self.occlusions.insert(node, occlusion);
+            }
         }
         if !changes.arrived.is_empty() {
             self.renderer.finish_uploads()?;
@@ -150,6 +150,10 @@ impl Backend for GpuBackend<'_> {
         let begin = Instant::now();
         let times = self.renderer.draw(front, &view.pose, self.near)?;
         Ok(Drawn { draw_ms: begin.elapsed().as_secs_f64() * 1e3, gpu_ms: times.gpu_ms })
+    }
+
+    fn occlusion(&mut self, node: u32) -> Option<Arc<NodeOcclusion>> {
+        self.occlusions.remove(&node).map(Arc::new)
     }
 
     fn priorities_set(&mut self) {

@@ -4,7 +4,6 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::backend::near_plane;
 use super::clock_fit::{Measured, fit_clock};
 use super::measurement_scene::MeasurementScene;
 use crate::Result;
@@ -82,7 +81,7 @@ impl Samples {
         pose: &Pose,
     ) -> Result<f64> {
         let view = View::new(*pose, DVec3::ZERO, measured.renderer().options().size);
-        let (first_ms, times) = times(measured.renderer(), front, pose, near_plane(tree))?;
+        let (first_ms, times) = times(measured.renderer(), front, pose, tree.near_plane())?;
         let ms = percentile(&times, 50.0);
         self.frames.push((FrontLoad::default().of(tree, front, &view, 0), ms));
         self.measured.push((TileLoad::default().of(tree, front, &view), ms));
@@ -153,6 +152,7 @@ fn choose(tree: &SceneTree, pose: &Pose, size: [u32; 2], pixels: f64) -> Result<
         view: &View::new(*pose, DVec3::ZERO, size),
         visibility: &Visibility::default(),
         seen: None,
+        hidden: None,
         predicted: &[],
         residents: &Residents::all(tree.len()),
         memory: MemoryUse { cap_bytes: u64::MAX, ..MemoryUse::default() },

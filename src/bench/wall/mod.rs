@@ -8,6 +8,5 @@ mod process;
 mod snapshots;
 
 pub use backend::GpuBackend;
-pub(in crate::bench) use backend::near_plane;
 pub use calibrate::{Calibration, calibrate, measure_start};
 pub use snapshots::Snapshots;

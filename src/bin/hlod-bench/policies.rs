@@ -12,7 +12,7 @@ use hlod::runtime::residency::ResidencyOptions;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::print;
-use super::run_args::{Bytes, parse_size};
+use super::run_args::{Bytes, Switch, parse_size};
 
 /// Noise of a frame's time and stalls, where no constants are given: those of a desktop machine
 /// that does other things too.
@@ -60,6 +60,9 @@ pub struct PoliciesArgs {
     /// Draw the frames before and after every toggle as well, for the sum of all pops
     #[arg(long)]
     pops: bool,
+    /// Whether nodes are left out that are hidden by what is drawn before them
+    #[arg(long, value_enum, default_value_t = Switch::On)]
+    visibility: Switch,
     /// Constants of the model clock that `calibrate` wrote [default: lavapipe's, with noise]
     #[arg(long, value_name = "CLOCK.json")]
     constants: Option<PathBuf>,
@@ -154,6 +157,7 @@ fn plan(arguments: &PoliciesArgs) -> PoliciesPlan {
                 ..ResidencyOptions::DEFAULT
             },
             size: arguments.size,
+            cull_hidden: arguments.visibility == Switch::On,
             ..BenchOptions::default()
         },
     }

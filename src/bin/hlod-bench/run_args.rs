@@ -54,6 +54,11 @@ pub struct RunArgs {
     #[arg(long, value_name = "CONSTANT=VALUE", value_parser = parse_setting, help_heading = "Selection")]
     pub set: Vec<(String, f64)>,
 
+    /// Whether nodes are left out that are hidden by what is drawn before them: the same images, in less
+    /// time
+    #[arg(long, value_enum, default_value_t = Switch::On, help_heading = "Selection")]
+    pub visibility: Switch,
+
     /// maxMemory: memory cap in bytes, loads in progress included; with KiB, MiB or GiB
     #[arg(long, value_name = "BYTES", default_value_t = Bytes(RESIDENCY.max_memory_bytes), help_heading = "Memory and loading")]
     pub max_memory: Bytes,
@@ -103,6 +108,12 @@ pub struct RunArgs {
 pub enum Clock {
     Wall,
     Model,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Switch {
+    On,
+    Off,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -189,6 +200,7 @@ impl RunArgs {
             pace: self.pace,
             size: self.size,
             warm_up_frames: self.warm_up_frames,
+            cull_hidden: self.visibility == Switch::On,
             seed: self.seed,
         })
     }

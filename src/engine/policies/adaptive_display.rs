@@ -92,6 +92,9 @@ impl AdaptiveDisplay {
     /// Benefit of the children of a node in view over that of the node, over what they cost more;
     /// less where that is a change, more where the change is the other way.
     fn value(&self, frame: &FrameInput<'_>, node: u32) -> f64 {
+        if frame.is_hidden(node) {
+            return 0.0;
+        }
         let triangles = |node: u32| f64::from(frame.tree.node(node).triangles.max(1));
         let accuracy = |samples: f64| 1.0 - BASE_ERROR / samples;
         let children: f64 = visible_children(frame, node).map(triangles).sum();
@@ -131,13 +134,13 @@ impl AdaptiveDisplay {
     }
 
     fn push_upgrade(&mut self, frame: &FrameInput<'_>, node: u32) {
-        if frame.can_refine(node) && frame.is_visible(node) {
+        if frame.can_refine(node) && frame.is_visible(node) && !frame.is_hidden(node) {
             self.upgrades.push(Ranked { rank: self.value(frame, node), node });
         }
     }
 
     fn push_downgrade(&mut self, frame: &FrameInput<'_>, node: u32) {
-        if self.is_last(frame, node) {
+        if self.is_last(frame, node) && !frame.is_hidden(node) {
             self.downgrades.push(Ranked { rank: -self.value(frame, node), node });
         }
     }

@@ -85,6 +85,9 @@ struct BestFirst {
 /// What refining a node removes of the error of the image, over what it takes: the part of the
 /// image that it covers, times the metres of mean error that its children do not have, in pixels.
 fn rank(frame: &FrameInput<'_>, node: u32) -> f64 {
+    if frame.is_hidden(node) {
+        return 0.0;
+    }
     let &FrameInput { tree, view, .. } = frame;
     let at = tree.node(node);
     let children = tree.children(node).iter().map(|&child| tree.node(child).mean_error);
@@ -129,7 +132,7 @@ impl BestFirst {
     /// A node that is drawn could be refined.
     fn consider(&mut self, frame: &FrameInput<'_>, node: u32, out: &mut Selection) {
         let children = frame.tree.children(node);
-        if children.is_empty() || !frame.is_visible(node) {
+        if children.is_empty() || !frame.is_visible(node) || frame.is_hidden(node) {
             return;
         }
         let rank = rank(frame, node);

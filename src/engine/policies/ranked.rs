@@ -42,9 +42,10 @@ pub(super) fn visible_children<'a>(
     frame.tree.children(node).iter().copied().filter(|&child| frame.is_visible(child))
 }
 
-/// Milliseconds that the children of a node in view take more than the node; more than 0.
+/// Milliseconds that the children of a node that are in view and not hidden take more than the node;
+/// more than 0.
 pub(super) fn refining_ms(frame: &FrameInput<'_>, node: u32) -> f64 {
-    added_ms(frame, node, visible_children(frame, node))
+    added_ms(frame, node, visible_children(frame, node).filter(|&child| !frame.is_hidden(child)))
 }
 
 /// The same of all its children, whatever of them is in view.
@@ -69,8 +70,9 @@ pub(super) fn count_culled(frame: &FrameInput<'_>, out: &mut Selection) {
     out.culled = culled.count() as u32;
 }
 
-/// Milliseconds of a frame that draws a front.
+/// Milliseconds of a frame that draws what of a front is not hidden.
 pub(super) fn front_ms(frame: &FrameInput<'_>, front: &[u32]) -> f64 {
-    let load = FrontLoad::default().of(frame.tree, front, frame.view, 0);
+    let drawn: Vec<u32> = front.iter().copied().filter(|&node| !frame.is_hidden(node)).collect();
+    let load = FrontLoad::default().of(frame.tree, &drawn, frame.view, 0);
     frame.costs.priced_ms(&load)
 }

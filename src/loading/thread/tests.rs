@@ -28,7 +28,7 @@ fn nothing(files: &NodeFiles, reading: Reading) -> Result<Arrival> {
         draws: Vec::new(),
         pictures: Vec::new(),
     };
-    Ok(Arrival { node: reading.node(), content, pictures: Vec::new() })
+    Ok(Arrival { node: reading.node(), content, pictures: Vec::new(), occlusion: None })
 }
 
 fn faulty(files: &NodeFiles, reading: Reading) -> Result<Arrival> {

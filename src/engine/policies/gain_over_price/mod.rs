@@ -126,13 +126,14 @@ impl GainOverPrice {
 
     fn push_upgrade(&mut self, frame: &FrameInput<'_>, node: u32) {
         let rank = self.ranks[node as usize];
-        if rank > 0.0 && frame.can_refine(node) {
+        if rank > 0.0 && !frame.is_hidden(node) && frame.can_refine(node) {
             self.upgrades.push(Ranked { rank, node });
         }
     }
 
     fn push_downgrade(&mut self, frame: &FrameInput<'_>, node: u32) {
-        if self.is_last(frame, node) {
+        // What is hidden takes no time.
+        if self.is_last(frame, node) && !frame.is_hidden(node) {
             self.downgrades.push(Ranked { rank: -self.ranks[node as usize], node });
         }
     }
@@ -231,9 +232,12 @@ impl GainOverPrice {
         out.requests.extend(frame.tree.roots().iter().map(|&root| (root, f64::MAX)));
         for &node in &self.visited {
             let rank = self.ranks[node as usize];
-            out.requests.extend(frame.tree.children(node).iter().map(|&child| {
-                let is_there = frame.residents.contains(child);
-                (child, if is_there { rank } else { rank / self.options.hysteresis })
+            let is_hidden = frame.is_hidden(node);
+            out.requests.extend(frame.tree.children(node).iter().filter_map(|&child| {
+                match frame.residents.contains(child) {
+                    true => Some((child, rank)),
+                    false => (!is_hidden).then_some((child, rank / self.options.hysteresis)),
+                }
             }));
         }
     }

@@ -1,0 +1,227 @@
+//! Which nodes are hidden by what is drawn before them.
+
+use std::cell::Cell;
+use std::sync::Arc;
+
+use super::hiding_picture::HidingPicture;
+use super::node_occlusion::NodeOcclusion;
+use crate::camera::View;
+use crate::engine::Visibility;
+use crate::runtime::SceneTree;
+
+/// Where less than this part of what frames take is hidden, it is not looked for in the next frames.
+const LEAST_SAVED: f64 = 0.02;
+
+/// Slabs that are drawn where less than `MUCH` is hidden.
+const SLABS: usize = 300;
+
+/// And where more is.
+const MORE_SLABS: usize = 1000;
+
+/// So much is hidden in streets, less from above.
+const MUCH: f64 = 0.2;
+
+/// After so many seconds it is looked for again.
+const LOOK_AGAIN_S: f64 = 0.5;
+
+/// What is hidden is counted on after so many seconds, so that levels do not change with it.
+const STEADY_S: f64 = 0.5;
+
+/// Which nodes are hidden by what is drawn before them: nothing of them would be seen, were they drawn.
+///
+/// What hides is the front itself, at the levels that are drawn: flat pieces of its surfaces that
+/// cover all pixels of a cell of the image, whatever a graphics card makes of their edges. While a front is
+/// being chosen, that of the frame before stands for it, seen from where the camera is now.
+#[derive(Clone, Debug)]
+pub struct HiddenNodes {
+    /// Metres; nothing nearer is drawn.
+    near: f64,
+    /// By node, those in memory.
+    nodes: Vec<Option<Arc<NodeOcclusion>>>,
+    picture: HidingPicture,
+    view: Option<View>,
+    /// The nodes that hide others in the picture.
+    hiding: Vec<u32>,
+    /// Which nodes were found to be in sight in it.
+    in_sight: Visibility,
+    /// By node: when it was last found to be in sight, seconds.
+    seen_s: Vec<Cell<f64>>,
+    now_s: f64,
+    /// Nodes of the frame before that were drawn.
+    drawn: Vec<u32>,
+    /// Whether it is looked for in this frame.
+    is_looked_for: bool,
+    since_s: f64,
+    /// What part was saved when it was looked for last.
+    saved: f64,
+}
+
+impl HiddenNodes {
+    /// Nothing is known of as many nodes; nothing nearer than `near` metres is drawn.
+    pub fn new(nodes: usize, near: f64) -> Self {
+        Self {
+            near,
+            nodes: vec![None; nodes],
+            picture: HidingPicture::default(),
+            view: None,
+            hiding: Vec::new(),
+            in_sight: Visibility::default(),
+            seen_s: vec![Cell::new(f64::NEG_INFINITY); nodes],
+            now_s: 0.0,
+            drawn: Vec::new(),
+            is_looked_for: true,
+            since_s: 0.0,
+            saved: 0.0,
+        }
+    }
+
+    /// What a node that is in memory hides, and how it may be hidden; or that it is no more.
+    pub fn set(&mut self, node: u32, occlusion: Option<Arc<NodeOcclusion>>) {
+        self.nodes[node as usize] = occlusion;
+    }
+
+    /// Begins a frame, `dt_s` seconds after the one before: until its front is chosen, what was drawn
+    /// before hides what is behind it.
+    pub fn begin_frame(&mut self, view: &View, dt_s: f64) {
+        self.since_s += dt_s;
+        self.now_s += dt_s;
+        self.is_looked_for |= self.since_s >= LOOK_AGAIN_S;
+        let drawn = std::mem::take(&mut self.drawn);
+        self.look(view, &drawn);
+        self.drawn = drawn;
+    }
+
+    fn look(&mut self, view: &View, front: &[u32]) {
+        self.view = self.is_looked_for.then_some(*view);
+        if !self.is_looked_for {
+            return;
+        }
+        self.in_sight.begin_frame(self.nodes.len());
+        self.hiding.clear();
+        self.hiding.extend(front.iter().filter(|&&node| self.nodes[node as usize].is_some()));
+        let hiding: Vec<&NodeOcclusion> =
+            self.hiding.iter().filter_map(|&node| self.nodes[node as usize].as_deref()).collect();
+        let slabs = if self.saved < MUCH { SLABS } else { MORE_SLABS };
+        self.picture.draw(view, self.near, &hiding, slabs);
+    }
+
+    /// Whether nothing of a node would be seen, or of nodes below it that are within its box.
+    pub fn hides(&self, tree: &SceneTree, node: u32) -> bool {
+        let Some(view) = &self.view else { return false };
+        let is_out = |bbox| view.frustum.outside(bbox) > 0.0 || self.picture.hides(view, bbox);
+        let is_hidden = || match &self.nodes[node as usize] {
+            Some(occlusion) => occlusion.all_out(is_out),
+            None => is_out(tree.node(node).bbox),
+        };
+        let is_in_sight = || {
+            let is_in_sight = !is_hidden();
+            if is_in_sight {
+                self.seen_s[node as usize].set(self.now_s);
+            }
+            is_in_sight
+        };
+        !self.in_sight.get_or(node, is_in_sight)
+    }
+
+    /// The same for half a second at least.
+    pub fn hides_steadily(&self, tree: &SceneTree, node: u32) -> bool {
+        self.hides(tree, node) && self.now_s - self.seen_s[node as usize].get() >= STEADY_S
+    }
+
+    /// What has to be drawn of a front that was chosen: the same image as all of it.
+    pub fn drawn(&mut self, tree: &SceneTree, front: &[u32], view: &View) -> &[u32] {
+        let is_drawn = |hiding: &u32| front.contains(hiding);
+        if !self.hiding.iter().all(is_drawn) {
+            self.look(view, front);
+        }
+        self.drawn.clear();
+        let mut drawn = std::mem::take(&mut self.drawn);
+        drawn.extend(front.iter().copied().filter(|&node| !self.hides(tree, node)));
+        self.drawn = drawn;
+        &self.drawn
+    }
+
+    /// Tells what part of what the frame would have taken was saved.
+    pub fn saved(&mut self, part: f64) {
+        if self.is_looked_for {
+            self.since_s = 0.0;
+            self.is_looked_for = part >= LEAST_SAVED;
+            self.saved = part;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::occlusion::test_mesh::mesh;
+    use crate::mesh::UpAxis;
+    use crate::runtime::test_tree::{sketch, tree, view};
+
+    const FRAME_S: f64 = 1.0 / 32.0;
+
+    /// A square across the view at so many metres.
+    fn wall(distance: f32) -> Option<Arc<NodeOcclusion>> {
+        let corner = |y: f32, z: f32| [distance, y, z];
+        let mesh = mesh(&[
+            [corner(-3.0, -3.0), corner(3.0, -3.0), corner(3.0, 3.0)],
+            [corner(-3.0, -3.0), corner(3.0, 3.0), corner(-3.0, 3.0)],
+        ]);
+        Some(Arc::new(NodeOcclusion::new(&mesh, UpAxis::Z)))
+    }
+
+    /// Node 0 at 11 m, and behind it node 1 at 21 m and, not in memory, node 2 at 31 m.
+    fn row() -> (SceneTree, HiddenNodes) {
+        let tree = tree([11.0, 21.0, 31.0].map(|x| sketch([x, 0.0, 0.0], 1.0, vec![])).into());
+        let mut hidden = HiddenNodes::new(3, 0.1);
+        hidden.set(0, wall(10.5));
+        hidden.set(1, wall(20.5));
+        (tree, hidden)
+    }
+
+    #[test]
+    fn the_front_itself_hides() {
+        let (tree, mut hidden) = row();
+        hidden.begin_frame(&view(), FRAME_S);
+        assert!(!hidden.hides(&tree, 1), "nothing is drawn yet");
+        assert_eq!(hidden.drawn(&tree, &[0, 1, 2], &view()), [0, 1, 2]);
+        hidden.begin_frame(&view(), FRAME_S);
+        assert!(hidden.hides(&tree, 1) && hidden.hides(&tree, 2) && !hidden.hides(&tree, 0));
+        assert_eq!(hidden.drawn(&tree, &[2, 1, 0], &view()), [0]);
+        assert_eq!(hidden.drawn(&tree, &[1, 2], &view()), [1], "what hid them is not drawn");
+        hidden.set(1, None);
+        hidden.begin_frame(&view(), FRAME_S);
+        assert_eq!(hidden.drawn(&tree, &[1, 2], &view()), [1, 2], "it hides nothing that is known");
+    }
+
+    #[test]
+    fn what_has_just_been_in_sight_is_not_counted_on() {
+        let (tree, mut hidden) = row();
+        let mut steady = Vec::new();
+        for _ in 0..20 {
+            hidden.begin_frame(&view(), FRAME_S);
+            hidden.hides(&tree, 1);
+            steady.push(hidden.hides_steadily(&tree, 1));
+            hidden.drawn(&tree, &[0, 1], &view());
+        }
+        let first = steady.iter().position(|&steady| steady);
+        assert_eq!(first, Some((STEADY_S / FRAME_S) as usize));
+        assert!(steady[first.unwrap()..].iter().all(|&steady| steady));
+    }
+
+    #[test]
+    fn where_it_does_not_pay_it_is_looked_for_now_and_then() {
+        let (tree, mut hidden) = row();
+        let mut frame = |saved: f64| {
+            hidden.begin_frame(&view(), FRAME_S);
+            let drawn = hidden.drawn(&tree, &[0, 1], &view()).len();
+            hidden.saved(saved);
+            drawn
+        };
+        assert_eq!(frame(0.0), 2, "nothing was drawn before");
+        let looked = (0..64).filter(|_| frame(0.0) == 1).count();
+        assert_eq!(looked, 4);
+        let looked = (0..64).filter(|_| frame(0.5) == 1).count();
+        assert!((48..=64).contains(&looked), "{looked}");
+    }
+}
