@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::rectangles::{Edge, rectangles};
+use super::rectangles::{Edge, FillRule, rectangles};
 use super::slab::Slab;
 use super::surface::Surface;
 
@@ -226,17 +226,17 @@ impl Search<'_> {
         let v = across.cross(u);
         let mut border = Vec::new();
         let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
-        let mut both_sides = true;
-        for &(_, at) in piece {
-            let triangle = &self.surface.triangles[at as usize];
-            both_sides &= triangle.double_sided;
+        let triangles = piece.iter().map(|&(_, at)| &self.surface.triangles[at as usize]);
+        let both_sides = triangles.clone().all(|triangle| triangle.double_sided);
+        let rule = if both_sides { FillRule::EvenOdd } else { FillRule::NonZero };
+        for triangle in triangles {
             for point in triangle.points {
                 from = from.min(levels[point as usize]);
                 to = to.max(levels[point as usize]);
             }
             for (edge, _) in triangle.sides {
                 let turns = std::mem::take(&mut self.turns[edge as usize]);
-                if turns != 0 {
+                if turns != 0 && (rule == FillRule::NonZero || turns % 2 != 0) {
                     let place = |point: u32| {
                         let at = self.surface.points[point as usize];
                         [at.dot(u), at.dot(v)]
@@ -248,7 +248,7 @@ impl Search<'_> {
         }
         let rounding = ROUNDING * self.surface.diagonal;
         let mut covered = 0.0;
-        for found in rectangles(&border, self.least, FINE * self.surface.diagonal) {
+        for found in rectangles(&border, rule, self.least, FINE * self.surface.diagonal) {
             covered += found.new_area;
             let middle = |axis: usize| (found.min[axis] + found.max[axis]) / 2.0;
             let half = |axis: usize| (found.max[axis] - found.min[axis]) / 2.0 - rounding;
@@ -301,7 +301,12 @@ mod tests {
         assert!(found[0].half_across.x > 0.0, "its corners turn to the left from there");
         assert!(found[0].half_across.length() < 1e-3);
         let [one, [a, b, c]] = wall;
-        assert!(slabs(&[one, [a, c, b]]).iter().all(|slab| area(slab) < 20.0), "they disagree");
+        let found = slabs(&[one, [a, c, b]]);
+        assert!(area(&found[0]) > 0.9 * 40.0, "both sides are drawn, wherever each looks");
+        let mut mesh = mesh(&[one, [a, c, b]]);
+        mesh.primitives[0].surface.double_sided = false;
+        let found = find_slabs(&Surface::new(&mesh), DVec3::Z);
+        assert!(found.iter().all(|slab| area(slab) < 20.0), "one of them is seen from either side");
         assert!(slabs(&[]).is_empty());
         assert!(slabs(&[[[1.0; 3]; 3]]).is_empty(), "a point");
     }

@@ -2,7 +2,9 @@
 //!
 //! Seen along a direction, a surface is over a point as often as its border goes round it: of the
 //! triangles over the point as many more look towards the viewer than away. So where the border goes
-//! round, whatever is behind is hidden, and only the border is looked at here.
+//! round, whatever is behind is hidden, and only the border is looked at here. Of a surface that is
+//! drawn from either side it is enough that an odd number of triangles is over the point, whichever
+//! way each of them looks.
 
 /// Cells along the longer side of the border, at most.
 const CELLS: f64 = 96.0;
@@ -12,6 +14,13 @@ const RECTANGLES: usize = 12;
 
 /// What rounding may come to, of a cell.
 const ROUNDING: f64 = 1e-6;
+
+/// Which points are under a surface, by how often its border goes round them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FillRule {
+    NonZero,
+    EvenOdd,
+}
 
 /// An edge of the border of a surface.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +44,7 @@ pub(super) struct Rectangle {
 
 /// Rectangles round which a border goes and through which it does not, from the largest down to `least`
 /// in area; to within `fine` or more.
-pub(super) fn rectangles(edges: &[Edge], least: f64, fine: f64) -> Vec<Rectangle> {
+pub(super) fn rectangles(edges: &[Edge], rule: FillRule, least: f64, fine: f64) -> Vec<Rectangle> {
     let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for end in edges.iter().flat_map(|edge| edge.ends) {
         for axis in 0..2 {
@@ -60,6 +69,9 @@ pub(super) fn rectangles(edges: &[Edge], least: f64, fine: f64) -> Vec<Rectangle
     grid.cells = vec![Cell::default(); grid.columns * grid.rows];
     edges.iter().for_each(|edge| grid.add(edge));
     grid.sum_up();
+    if rule == FillRule::EvenOdd {
+        grid.cells.iter_mut().for_each(|cell| cell.turns = cell.turns.rem_euclid(2));
+    }
     std::iter::from_fn(|| grid.largest(least)).take(RECTANGLES).collect()
 }
 
@@ -76,6 +88,10 @@ struct Cell {
 impl Cell {
     fn is_free(&self, sign: i32) -> bool {
         !self.is_border && self.turns * sign > 0
+    }
+
+    fn is_new(&self, sign: i32) -> bool {
+        self.is_free(sign) && !self.is_covered
     }
 }
 
@@ -132,8 +148,12 @@ impl Grid {
 
     /// The rectangle that covers most of what is free and not yet covered.
     fn largest(&mut self, least: f64) -> Option<Rectangle> {
-        let left = self.largest_new(1);
-        let right = self.largest_new(-1);
+        // A surface that looks one way is usual.
+        let mut of_sign = |sign: i32| match self.cells.iter().any(|cell| cell.is_new(sign)) {
+            true => self.largest_new(sign),
+            false => Default::default(),
+        };
+        let (left, right) = (of_sign(1), of_sign(-1));
         let (sign, (new, columns, rows)) = if right.0 > left.0 { (-1, right) } else { (1, left) };
         let new_area = new as f64 * self.side * self.side;
         if new == 0 || new_area < least {
@@ -182,8 +202,10 @@ impl Grid {
         for row in 0..self.rows {
             let cells = &self.cells[row * self.columns..(row + 1) * self.columns];
             for (cell, height) in cells.iter().zip(&mut self.heights) {
-                let is_new = cell.is_free(sign) && !cell.is_covered;
-                *height = if is_new { *height + 1 } else { 0 };
+                *height = if cell.is_new(sign) { *height + 1 } else { 0 };
+            }
+            if self.heights.iter().all(|&height| height == 0) {
+                continue;
             }
             // Each rectangle ends at the first column that is lower; none is left at the last, of 0.
             self.stack.clear();
@@ -209,6 +231,7 @@ impl Grid {
 
 #[cfg(test)]
 mod tests {
+    use super::FillRule::{EvenOdd, NonZero};
     use super::*;
     use crate::random::Random;
 
@@ -241,20 +264,20 @@ mod tests {
 
     #[test]
     fn of_a_square_nearly_all_is_found_and_the_side_that_it_looks_to() {
-        let found = rectangles(&square(2.0, 7.0), 0.1, 0.0);
+        let found = rectangles(&square(2.0, 7.0), NonZero, 0.1, 0.0);
         assert!(area(&found[0]) > 0.9 * 25.0 && found[0].to_the_left, "{found:?}");
-        let found = rectangles(&reversed(square(2.0, 7.0)), 0.1, 0.0);
+        let found = rectangles(&reversed(square(2.0, 7.0)), NonZero, 0.1, 0.0);
         assert!(area(&found[0]) > 0.9 * 25.0 && !found[0].to_the_left, "{found:?}");
-        assert!(rectangles(&square(2.0, 7.0), 25.1, 0.0).is_empty(), "too small");
-        assert!(rectangles(&[], 0.0, 0.0).is_empty());
+        assert!(rectangles(&square(2.0, 7.0), NonZero, 25.1, 0.0).is_empty(), "too small");
+        assert!(rectangles(&[], NonZero, 0.0, 0.0).is_empty());
     }
 
     #[test]
     fn surfaces_that_look_at_each_other_hide_nothing_and_holes_are_left_open() {
         let both = [square(0.0, 9.0), reversed(square(0.0, 9.0))].concat();
-        assert!(rectangles(&both, 0.1, 0.0).is_empty());
+        assert!(rectangles(&both, NonZero, 0.1, 0.0).is_empty());
         let hole = [square(0.0, 9.0), reversed(square(4.0, 5.0))].concat();
-        let found = rectangles(&hole, 0.1, 0.0);
+        let found = rectangles(&hole, EvenOdd, 0.1, 0.0);
         let covered: f64 = found.iter().map(|rectangle| rectangle.new_area).sum();
         assert!((0.85 * 80.0..80.0).contains(&covered), "{covered}");
         for Rectangle { min, max, .. } in found {
@@ -273,12 +296,17 @@ mod tests {
                 let mut corner = |_| [0; 2].map(|_| random.between(-5.0, 5.0));
                 edges.extend(polygon(&(0..corners).map(&mut corner).collect::<Vec<_>>()));
             }
-            for Rectangle { min, max, to_the_left, .. } in rectangles(&edges, 0.05, 0.0) {
+            let rule = if random.unit() < 0.5 { NonZero } else { EvenOdd };
+            for Rectangle { min, max, to_the_left, .. } in rectangles(&edges, rule, 0.05, 0.0) {
                 found += 1;
                 for _ in 0..20 {
                     let at = [0, 1].map(|axis| random.between(min[axis], max[axis]));
                     let turns = turns(&edges, at);
-                    assert!(if to_the_left { turns > 0 } else { turns < 0 }, "{at:?} {turns}");
+                    let is_under = match rule {
+                        NonZero => turns.signum() == if to_the_left { 1 } else { -1 },
+                        EvenOdd => turns % 2 != 0,
+                    };
+                    assert!(is_under, "{rule:?} {at:?} {turns}");
                 }
             }
         }
