@@ -329,10 +329,6 @@ impl<'a> Engine<'a> {
         let frame = self.seen.from(view);
         report.toggle_causes = ToggleCauses::of(&frame, &self.toggles, changes);
         report.finer_resident = self.drawn.iter().any(|&node| frame.can_refine(node));
-        if let Some(hidden) = &mut self.seen.hidden {
-            let all = report.triangles + report.hidden_triangles;
-            hidden.saved(report.hidden_triangles as f64 / all.max(1) as f64);
-        }
     }
 
     fn count(&mut self, report: &mut FrameReport) -> Result<()> {

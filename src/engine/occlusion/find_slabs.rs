@@ -44,6 +44,9 @@ const BINS: usize = 2 * AZIMUTHS + 1;
 
 /// Finds slabs of a surface in a scene in which `up` is up.
 pub(super) fn find_slabs(surface: &Surface, up: DVec3) -> Vec<Slab> {
+    if !(surface.diagonal > 0.0 && surface.diagonal.is_finite()) {
+        return Vec::new();
+    }
     let mut search = Search {
         surface,
         up,
@@ -309,6 +312,8 @@ mod tests {
         assert!(found.iter().all(|slab| area(slab) < 20.0), "one of them is seen from either side");
         assert!(slabs(&[]).is_empty());
         assert!(slabs(&[[[1.0; 3]; 3]]).is_empty(), "a point");
+        assert!(slabs(&[[[0.0; 3], [1.0; 3], [f32::INFINITY; 3]]]).is_empty());
+        assert!(slabs(&[[[0.0; 3], [1.0; 3], [f32::NAN; 3]]]).is_empty());
     }
 
     #[test]

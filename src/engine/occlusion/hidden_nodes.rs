@@ -9,7 +9,7 @@ use crate::camera::View;
 use crate::engine::Visibility;
 use crate::runtime::SceneTree;
 
-/// Where less than this part of what frames take is hidden, it is not looked for in the next frames.
+/// Where less than this part of the triangles is hidden, it is not looked for in the next frames.
 const LEAST_SAVED: f64 = 0.02;
 
 /// Slabs that are drawn where less than `MUCH` is hidden.
@@ -47,12 +47,14 @@ pub struct HiddenNodes {
     /// By node: when it was last found to be in sight, seconds.
     seen_s: Vec<Cell<f64>>,
     now_s: f64,
+    /// By node; of no use but while a front is compared.
+    is_in_front: Vec<bool>,
     /// Nodes of the frame before that were drawn.
     drawn: Vec<u32>,
     /// Whether it is looked for in this frame.
     is_looked_for: bool,
     since_s: f64,
-    /// What part was saved when it was looked for last.
+    /// What part of the triangles was hidden when it was looked for last.
     saved: f64,
 }
 
@@ -68,6 +70,7 @@ impl HiddenNodes {
             in_sight: Visibility::default(),
             seen_s: vec![Cell::new(f64::NEG_INFINITY); nodes],
             now_s: 0.0,
+            is_in_front: vec![false; nodes],
             drawn: Vec::new(),
             is_looked_for: true,
             since_s: 0.0,
@@ -130,24 +133,26 @@ impl HiddenNodes {
 
     /// What has to be drawn of a front that was chosen: the same image as all of it.
     pub fn drawn(&mut self, tree: &SceneTree, front: &[u32], view: &View) -> &[u32] {
-        let is_drawn = |hiding: &u32| front.contains(hiding);
-        if !self.hiding.iter().all(is_drawn) {
+        front.iter().for_each(|&node| self.is_in_front[node as usize] = true);
+        let all_there = self.hiding.iter().all(|&node| self.is_in_front[node as usize]);
+        front.iter().for_each(|&node| self.is_in_front[node as usize] = false);
+        if !all_there {
             self.look(view, front);
         }
         self.drawn.clear();
         let mut drawn = std::mem::take(&mut self.drawn);
         drawn.extend(front.iter().copied().filter(|&node| !self.hides(tree, node)));
+        // Nothing hides before the first frame, which says nothing of the next.
+        if self.is_looked_for && !self.hiding.is_empty() {
+            let triangles = |nodes: &[u32]| -> f64 {
+                nodes.iter().map(|&node| f64::from(tree.node(node).triangles)).sum()
+            };
+            self.saved = 1.0 - triangles(&drawn) / triangles(front).max(1.0);
+            self.since_s = 0.0;
+            self.is_looked_for = self.saved >= LEAST_SAVED;
+        }
         self.drawn = drawn;
         &self.drawn
-    }
-
-    /// Tells what part of what the frame would have taken was saved.
-    pub fn saved(&mut self, part: f64) {
-        if self.is_looked_for {
-            self.since_s = 0.0;
-            self.is_looked_for = part >= LEAST_SAVED;
-            self.saved = part;
-        }
     }
 }
 
@@ -212,16 +217,15 @@ mod tests {
     #[test]
     fn where_it_does_not_pay_it_is_looked_for_now_and_then() {
         let (tree, mut hidden) = row();
-        let mut frame = |saved: f64| {
+        let mut frame = |front: &[u32]| {
             hidden.begin_frame(&view(), FRAME_S);
-            let drawn = hidden.drawn(&tree, &[0, 1], &view()).len();
-            hidden.saved(saved);
-            drawn
+            hidden.drawn(&tree, front, &view());
+            hidden.view.is_some()
         };
-        assert_eq!(frame(0.0), 2, "nothing was drawn before");
-        let looked = (0..64).filter(|_| frame(0.0) == 1).count();
-        assert_eq!(looked, 4);
-        let looked = (0..64).filter(|_| frame(0.5) == 1).count();
+        assert!(frame(&[0]));
+        let looked = (0..64).filter(|_| frame(&[0])).count();
+        assert_eq!(looked, 4, "nothing else is there");
+        let looked = (0..64).filter(|_| frame(&[0, 1])).count();
         assert!((48..=64).contains(&looked), "{looked}");
     }
 }
