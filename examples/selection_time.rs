@@ -103,7 +103,7 @@ struct Case {
 impl Case {
     fn measure(&mut self) -> Result<()> {
         let tree = &*self.tree;
-        let node = NodeSize { file_bytes: 1000, held_bytes: 1000, textures: Vec::new() };
+        let node = NodeSize { file_bytes: 1000, held_bytes: 1000, ..NodeSize::default() };
         let sizes = Sizes { nodes: vec![node; tree.len()], textures: Vec::new() };
         let residency = Residency::new(tree, sizes, ResidencyOptions::default())?;
         let mut settings = Settings::new();

@@ -23,10 +23,7 @@ impl ModelOcclusions {
     /// What a node hides; `None` where its file cannot be used, which a run that draws would tell of.
     pub fn of(&self, node: u32) -> Option<Arc<NodeOcclusion>> {
         let mut known = self.known.lock().ok()?;
-        let find = || {
-            let mesh = self.files.read_mesh(node).ok()?;
-            Some(Arc::new(NodeOcclusion::new(&mesh, self.files.scene().up)))
-        };
+        let find = || self.files.read_occlusion(node).ok().map(Arc::new);
         known.entry(node).or_insert_with(find).clone()
     }
 }

@@ -55,6 +55,7 @@ impl FrameRecord {
             "uploaded_bytes",
             "arrived",
             "waiting",
+            "lacking",
             "evictions",
             "process_bytes",
         ];
@@ -101,6 +102,7 @@ impl FrameRecord {
             report.uploaded_bytes.to_string(),
             report.arrived.to_string(),
             report.waiting.to_string(),
+            report.lacking.to_string(),
             report.evictions.to_string(),
             self.process_bytes.to_string(),
         ];

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::Result;
 use crate::camera::CameraPath;
-use crate::engine::{CostModel, Occluders, Policy};
+use crate::engine::{CostModel, NodeOcclusion, Occluders, Policy};
 use crate::format::Scene;
 use crate::loading::NodeFiles;
 use crate::render::content::{held_bytes, picture_bytes};
@@ -57,9 +57,25 @@ impl Session {
         self.tree.clone().with_textured_weight(&self.scene, constants.textured_weight)
     }
 
-    fn residency(&self, options: &BenchOptions) -> Result<Arc<Mutex<Residency>>> {
+    fn residency(
+        &self,
+        options: &BenchOptions,
+        policy: &dyn Policy,
+    ) -> Result<Arc<Mutex<Residency>>> {
+        let occlusion = |node: u32| {
+            let at = self.tree.node(node);
+            let hides =
+                if options.cull_hidden { NodeOcclusion::most_bytes(at.triangles) } else { 0 };
+            match at.parent {
+                None if policy.wants_seen_areas() => {
+                    hides + Occluders::most_bytes(at.vertices, at.triangles)
+                }
+                _ => hides,
+            }
+        };
         let sizes =
-            Sizes::new(&self.scene, held_bytes, |[width, height]| picture_bytes(width, height));
+            Sizes::new(&self.scene, held_bytes, |[width, height]| picture_bytes(width, height))
+                .with_beside(occlusion);
         Ok(Arc::new(Mutex::new(Residency::new(&self.tree, sizes, options.residency)?)))
     }
 
@@ -113,11 +129,12 @@ impl Session {
         let occluders = self.occluders(&*policy);
         let mut backend = ModelBackend::new(&tree, constants, options.seed)
             .with_occlusions(Arc::clone(&self.occlusions));
+        let residency = self.residency(&options, &*policy)?;
         let replay = Replay {
             tree: &tree,
             path,
             policy: &mut *policy,
-            residency: self.residency(&options)?,
+            residency,
             backend: &mut backend,
             costs: CostModel::new(&constants.prices),
             occluders,
@@ -146,7 +163,8 @@ impl Session {
     ) -> Result<(Run, Context)> {
         options.check()?;
         // Roots that do not fit are told of before anything is loaded.
-        let residency = self.residency(&options)?;
+        let mut policy = options.policy.make()?;
+        let residency = self.residency(&options, &*policy)?;
         let weight = constants.unwrap_or_default();
         let tree = self.tree_for(&weight);
         let constants = match constants {
@@ -156,7 +174,6 @@ impl Session {
                 ..ClockConstants::default()
             },
         };
-        let mut policy = options.policy.make()?;
         let adapter = serde_json::to_value(renderer.adapter()).map_err(|error| {
             crate::Error::Internal(format!("an adapter without JSON form: {error}"))
         })?;

@@ -132,6 +132,8 @@ pub fn summary(run: &Run, context: &Context) -> Value {
             "evictions": bytes(|frame| frame.report.evictions),
             "waiting_mean": mean(of(|frame| f64::from(frame.report.waiting))),
             "waiting_last": frames.last().map(|frame| frame.report.waiting),
+            // Frames in which a node was not in memory that would have been drawn.
+            "lacking_percent": mean(of(|frame| f64::from(u8::from(frame.report.lacking > 0)))) * 100.0,
         },
         "accuracy": context.reference.as_ref().map(|reference| accuracy(frames, reference)),
         "select_ms": {

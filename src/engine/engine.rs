@@ -295,8 +295,9 @@ impl<'a> Engine<'a> {
         let input = self.seen.from(view);
         let utility = |&node: &u32| (node, self.policy.utility(&input, node));
         self.others.extend(self.stale.iter().map(utility));
-        let Selection { front, requests, released, keep_visited, .. } = &self.selection;
+        let Selection { front, requests, ahead, released, keep_visited, .. } = &self.selection;
         residency.set_priorities(requests, &self.others);
+        residency.set_ahead(ahead);
         residency.set_needed(front.iter().copied());
         if *keep_visited {
             residency.set_needed(requests.iter().map(|&(node, _)| node));
@@ -310,6 +311,7 @@ impl<'a> Engine<'a> {
         let selection = &self.selection;
         report.diagnostics.clone_from(&selection.diagnostics);
         (report.visited, report.culled) = (selection.visited() as u32, selection.culled);
+        report.lacking = selection.lacking;
         report.nodes = self.drawn.len() as u32;
         report.hidden_nodes = selection.front.len() as u32 - report.nodes;
         let triangles = |nodes: &[u32]| -> u64 {

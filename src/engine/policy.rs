@@ -61,6 +61,13 @@ impl FrameInput<'_> {
         self.hidden.is_some_and(|hidden| hidden.hides_steadily(self.tree, node))
     }
 
+    /// How many of the children of a node are in view and not in memory.
+    pub fn missing_children(&self, node: u32) -> u32 {
+        let children = self.tree.children(node).iter();
+        let is_missing = |&&child: &&u32| !self.residents.contains(child) && self.is_visible(child);
+        children.filter(is_missing).count() as u32
+    }
+
     /// Whether the children of a node can be drawn in its place: it has some, and all of them that
     /// are in view are resident.
     pub fn can_refine(&self, node: u32) -> bool {
@@ -121,6 +128,9 @@ pub struct Selection {
     /// least 0. The most useful node that is not in memory is loaded first, and the least useful
     /// ones are evicted for it.
     pub requests: Vec<(u32, f64)>,
+    /// Nodes that may be wanted soon and are not among the requests, with their utility: loaded in their
+    /// turn, at a tenth of the rate.
+    pub ahead: Vec<(u32, f64)>,
     /// Nodes whose memory may be freed though there is room.
     pub released: Vec<u32>,
     /// Milliseconds that the frame should take; `None` for what the [`CostModel`] says.
@@ -129,6 +139,8 @@ pub struct Selection {
     pub diagnostics: Vec<f64>,
     /// Of the nodes visited, those outside of the view.
     pub culled: u32,
+    /// Nodes that would be drawn, in place of coarser ones, were they in memory.
+    pub lacking: u32,
     /// None of the nodes visited is evicted, not only those of the front.
     pub keep_visited: bool,
 }
@@ -147,9 +159,10 @@ impl Selection {
     pub fn clear(&mut self) {
         self.front.clear();
         self.requests.clear();
+        self.ahead.clear();
         self.released.clear();
         self.diagnostics.clear();
-        (self.estimate, self.culled, self.keep_visited) = (None, 0, false);
+        (self.estimate, self.culled, self.lacking, self.keep_visited) = (None, 0, 0, false);
     }
 
     /// Number of nodes visited.

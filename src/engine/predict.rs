@@ -6,7 +6,7 @@ use super::PredictedView;
 use crate::camera::{Pose, View};
 
 /// Seconds for which views are predicted.
-const AFTER_S: [f64; 2] = [0.5, 1.0];
+const AFTER_S: [f64; 3] = [0.25, 0.5, 1.0];
 
 /// Turns of more than this in a frame are cuts, and not expected to go on; radians.
 const CUT: f64 = 0.5;
@@ -60,7 +60,7 @@ mod tests {
         let mut out = Vec::new();
         predict(Some(&before), &now, 0.1, &mut out);
         let expected = DQuat::from_rotation_z(0.1) * now.pose.rotation;
-        let found = &out[1];
+        let found = &out[2];
         assert_eq!((found.after_s, found.view.pose.position.x), (1.0, 2.0));
         assert!(found.view.pose.rotation.dot(expected).abs() > 1.0 - 1e-12);
     }

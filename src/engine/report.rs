@@ -59,8 +59,10 @@ pub struct FrameReport {
     pub uploaded_bytes: u64,
     /// Nodes that became resident before it.
     pub arrived: u32,
-    /// Nodes that are wanted and not in memory.
+    /// Nodes that are asked for and not in memory.
     pub waiting: u32,
+    /// Nodes that would have been drawn, in place of coarser ones, had they been in memory.
+    pub lacking: u32,
     /// Nodes evicted during the frame.
     pub evictions: u64,
     /// Nodes drawn, by level.

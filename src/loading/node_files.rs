@@ -130,11 +130,22 @@ impl NodeFiles {
 
     /// Reads the geometry of a node alone: its pictures stay encoded.
     pub fn read_mesh(&self, node: u32) -> Result<NodeMesh> {
+        self.with_mesh(node, |mesh| mesh)
+    }
+
+    /// Reads what a node hides, and how it may be hidden.
+    pub fn read_occlusion(&self, node: u32) -> Result<NodeOcclusion> {
+        self.with_mesh(node, |mesh| NodeOcclusion::new(&mesh, self.scene.up))
+    }
+
+    fn with_mesh<T>(&self, node: u32, make: impl FnOnce(NodeMesh) -> T) -> Result<T> {
         let mut reading = self.begin(node, |_| true);
         let bytes = reading.left();
         reading.read(bytes)?;
         let path = reading.path().to_owned();
-        guarded(path.clone(), || read_glb(self.checked(node, &path, &reading.bytes)?.0, &path))
+        guarded(path.clone(), || {
+            Ok(make(read_glb(self.checked(node, &path, &reading.bytes)?.0, &path)?))
+        })
     }
 
     /// Reads and decodes a node in one go.

@@ -59,6 +59,7 @@ pub struct SceneTree {
     roots: u32,
     levels: usize,
     bounds: [DVec3; 2],
+    up: DVec3,
 }
 
 impl SceneTree {
@@ -93,7 +94,8 @@ impl SceneTree {
         }
         let bounds = scene.bounds().unwrap_or_default().map(DVec3::from);
         let levels = scene.level_count();
-        Self { nodes, indices, places, roots, levels, bounds }
+        let up = scene.up.from_z_up(DVec3::Z);
+        Self { nodes, indices, places, roots, levels, bounds, up }
     }
 
     /// Computes costs anew (eq. 3.1) with another `c_textured` than that of the build: how much
@@ -168,6 +170,11 @@ impl SceneTree {
     /// Metres of the nearest that is drawn: a hand's breadth, and less in scenes of a few metres.
     pub fn near_plane(&self) -> f32 {
         ((self.diagonal() * 1e-4) as f32).clamp(1e-6, 0.1)
+    }
+
+    /// The direction that is up, of length 1.
+    pub fn up(&self) -> DVec3 {
+        self.up
     }
 
     /// Length of the diagonal of the box around everything, metres.

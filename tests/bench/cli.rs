@@ -51,9 +51,9 @@ fn help_names_every_option_with_its_unit_and_range() {
         "make-path",
         "calibrate",
         "milliseconds that a frame may take, above 0 [default: 30]",
-        "[default: best-first]",
+        "[default: gain-over-price]",
         "screen-error-loop",
-        "gain-over-price",
+        "best-first",
         "--set <CONSTANT=VALUE>",
         "0 or more [default: 0.1]",
         "KiB, MiB or GiB [default: 1GiB]",
@@ -79,7 +79,7 @@ fn help_names_every_option_with_its_unit_and_range() {
         assert!(policies.contains(part), "{part:?} is not in\n{policies}");
     }
     let list = help(&["policies", "--list"]);
-    for part in ["best-first (default)", "lakhia", "--set hyst_switch=1500", "0 to 1"] {
+    for part in ["gain-over-price (default)", "lakhia", "--set hyst_switch=1500", "0 to 1"] {
         assert!(list.contains(part), "{part:?} is not in\n{list}");
     }
     assert!(help(&["calibrate", "--help"]).contains("--constants"));

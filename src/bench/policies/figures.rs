@@ -23,7 +23,7 @@ const fn figure(name: &'static str, head: &'static str, digits: usize) -> Figure
 }
 
 /// The figures of a run, in the order of [`PolicyRun::values`].
-pub const FIGURES: [Figure; 20] = [
+pub const FIGURES: [Figure; 21] = [
     figure("flip_mean", "FLIP", 4),
     figure("flip_p95", "FLIP p95", 4),
     figure("flip_to_oracle", "to oracle", 4),
@@ -37,6 +37,7 @@ pub const FIGURES: [Figure; 20] = [
     figure("arrived_per_min", "arrived", 0),
     figure("evicted_per_min", "evicted", 0),
     figure("came_into_view_per_min", "into view", 0),
+    figure("lacking_percent", "lacking, %", 1),
     figure("pop_flip_sum", "pops, ΣFLIP", 3),
     figure("read_mb", "read, MB", 1),
     figure("reread_mb", "again, MB", 1),
@@ -106,6 +107,7 @@ impl PolicyRun {
             per_min(|frame| frame.report.toggle_causes.arrived),
             per_min(|frame| frame.report.toggle_causes.evicted),
             per_min(|frame| frame.report.toggle_causes.came_into_view),
+            mean(of(|frame| f64::from(u8::from(frame.report.lacking > 0)))) * 100.0,
             if inspected.every_toggle { pops.iter().sum() } else { f64::NAN },
             mb(sum(|frame| frame.report.read_bytes)),
             mb(sum(|frame| frame.report.reread_bytes)),
@@ -180,6 +182,7 @@ mod tests {
                 toggles_up: 1,
                 toggle_causes: ToggleCauses { arrived: 1, ..ToggleCauses::default() },
                 finer_resident: index < 3,
+                lacking: u32::from(index == 5),
                 read_bytes: 1_000_000,
                 ..FrameReport::default()
             },
@@ -209,6 +212,7 @@ mod tests {
             ("toggles_per_min", 600.0),
             ("arrived_per_min", 600.0),
             ("chosen_per_min", 0.0),
+            ("lacking_percent", 10.0),
             ("pop_flip_sum", 2.5),
             ("read_mb", 10.0),
             ("peak_mb", 5.0),

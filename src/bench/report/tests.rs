@@ -117,7 +117,7 @@ fn a_page_has_each_figure_with_axes_legend_and_a_sentence() {
         "thousand triangles",
         "city along walk.csv",
         "5ce9e",
-        "policy.constants.cooldown_s",
+        "policy.constants.dwell_s",
         "−2.01 %",
         "15.19 %",
         "walk 133, drive 11",

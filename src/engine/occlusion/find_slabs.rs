@@ -289,10 +289,6 @@ mod tests {
         find_slabs(&Surface::new(&mesh(triangles)), DVec3::Z)
     }
 
-    fn area(slab: &Slab) -> f32 {
-        4.0 * slab.half[0].cross(slab.half[1]).length()
-    }
-
     #[test]
     fn a_wall_is_one_slab_and_looks_outward() {
         let wall = [
@@ -300,16 +296,19 @@ mod tests {
             [[3.0, 0.0, 0.0], [3.0, 8.0, 5.0], [3.0, 0.0, 5.0]],
         ];
         let found = slabs(&wall);
-        assert!(area(&found[0]) > 0.9 * 40.0, "{found:?}");
+        assert!(found[0].area() > 0.9 * 40.0, "{found:?}");
         assert!(found[0].half_across.x > 0.0, "its corners turn to the left from there");
         assert!(found[0].half_across.length() < 1e-3);
         let [one, [a, b, c]] = wall;
         let found = slabs(&[one, [a, c, b]]);
-        assert!(area(&found[0]) > 0.9 * 40.0, "both sides are drawn, wherever each looks");
+        assert!(found[0].area() > 0.9 * 40.0, "both sides are drawn, wherever each looks");
         let mut mesh = mesh(&[one, [a, c, b]]);
         mesh.primitives[0].surface.double_sided = false;
         let found = find_slabs(&Surface::new(&mesh), DVec3::Z);
-        assert!(found.iter().all(|slab| area(slab) < 20.0), "one of them is seen from either side");
+        assert!(
+            found.iter().all(|slab| slab.area() < 20.0),
+            "one of them is seen from either side"
+        );
         assert!(slabs(&[]).is_empty());
         assert!(slabs(&[[[1.0; 3]; 3]]).is_empty(), "a point");
         assert!(slabs(&[[[0.0; 3], [1.0; 3], [f32::INFINITY; 3]]]).is_empty());
@@ -323,7 +322,7 @@ mod tests {
         for _ in 0..20 {
             let wall = bumpy_wall(&mut random);
             for slab in slabs(&wall) {
-                large += u32::from(area(&slab) > 20.0);
+                large += u32::from(slab.area() > 20.0);
                 let mut at = |face: f32| {
                     let [u, v] = slab.half.map(|half| half * random.between(-1.0, 1.0) as f32);
                     (slab.middle + u + v + slab.half_across * face).as_dvec3()

@@ -3,11 +3,14 @@
 use glam::DVec3;
 
 use super::find_slabs::find_slabs;
-use super::pieces::{Piece, pieces};
+use super::pieces::Pieces;
 use super::slab::Slab;
 use super::surface::Surface;
 use crate::format::NodeMesh;
 use crate::mesh::UpAxis;
+
+/// Slabs of a node, at most: the largest.
+const MOST_SLABS: usize = 64;
 
 /// A node as what hides others, and as what may be hidden.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,17 +20,23 @@ pub struct NodeOcclusion {
     /// Behind these nothing is seen.
     pub(super) slabs: Vec<Slab>,
     /// Boxes around all of it, and around its parts.
-    pub(super) pieces: Vec<Piece>,
+    pieces: Pieces,
 }
 
 impl NodeOcclusion {
     /// Of what is drawn of a node, in a scene whose up axis is `up`.
     pub fn new(mesh: &NodeMesh, up: UpAxis) -> Self {
-        Self {
-            origin: mesh.origin.into(),
-            slabs: find_slabs(&Surface::new(mesh), up.from_z_up(DVec3::Z)),
-            pieces: pieces(mesh),
-        }
+        let mut slabs = find_slabs(&Surface::new(mesh), up.from_z_up(DVec3::Z));
+        slabs.sort_by(|a, b| b.area().total_cmp(&a.area()));
+        slabs.truncate(MOST_SLABS);
+        slabs.shrink_to_fit();
+        Self { origin: mesh.origin.into(), slabs, pieces: Pieces::new(mesh) }
+    }
+
+    /// Most bytes that it takes in memory, for a node of so many triangles.
+    pub fn most_bytes(triangles: u32) -> u64 {
+        let slabs = MOST_SLABS * size_of::<Slab>() + size_of::<Self>();
+        slabs as u64 + Pieces::most_bytes(triangles as usize)
     }
 
     /// Whether all of it is in boxes of which `is_out` says that nothing in them is seen; not where there
@@ -35,8 +44,7 @@ impl NodeOcclusion {
     pub(super) fn all_out(&self, is_out: impl Fn([DVec3; 2]) -> bool) -> bool {
         let mut at = 0;
         while let Some(piece) = self.pieces.get(at) {
-            let bbox = piece.bbox.map(|corner| corner.as_dvec3() + self.origin);
-            if is_out(bbox) {
+            if is_out(self.pieces.bbox(piece).map(|corner| corner + self.origin)) {
                 at += piece.boxes as usize;
             } else if piece.boxes > 1 {
                 at += 1;
@@ -45,5 +53,26 @@ impl NodeOcclusion {
             }
         }
         !self.pieces.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::occlusion::test_mesh::{bumpy_wall, mesh};
+    use crate::random::Random;
+
+    #[test]
+    fn it_takes_no_more_than_was_said() {
+        let mut random = Random::new(8, 0);
+        let walls: Vec<_> = (0..200).map(|_| bumpy_wall(&mut random)).collect();
+        for many in [1, 200] {
+            let mesh = mesh(&walls[..many].concat());
+            let triangles = mesh.primitives[0].indices.len() as u32 / 3;
+            let found = NodeOcclusion::new(&mesh, UpAxis::Z);
+            let slabs = found.slabs.capacity() * size_of::<Slab>() + size_of::<NodeOcclusion>();
+            let bytes = slabs as u64 + Pieces::most_bytes(triangles as usize);
+            assert!(!found.slabs.is_empty() && bytes <= NodeOcclusion::most_bytes(triangles));
+        }
     }
 }

@@ -23,12 +23,20 @@ pub struct Occluders {
 }
 
 impl Occluders {
+    /// Most bytes that a node with so many vertices and triangles takes here.
+    pub fn most_bytes(vertices: u32, triangles: u32) -> u64 {
+        let points = u64::from(vertices) * size_of::<Vec3>() as u64;
+        let corners = u64::from(triangles) * size_of::<[u32; 3]>() as u64;
+        size_of::<Occluder>() as u64 + points + corners
+    }
+
     /// Adds what of a node is opaque, and within the box `bbox`.
     pub fn add(&mut self, bbox: [DVec3; 2], mesh: &NodeMesh) {
-        let mut positions = Vec::new();
-        let mut triangles = Vec::new();
         let is_opaque = |alpha: &AlphaMode| matches!(alpha, AlphaMode::Opaque);
-        for primitive in mesh.primitives.iter().filter(|at| is_opaque(&at.surface.alpha)) {
+        let opaque = || mesh.primitives.iter().filter(|at| is_opaque(&at.surface.alpha));
+        let mut positions = Vec::with_capacity(opaque().map(|at| at.positions.len()).sum());
+        let mut triangles = Vec::with_capacity(opaque().map(|at| at.indices.len() / 3).sum());
+        for primitive in opaque() {
             let first = positions.len() as u32;
             positions.extend(primitive.positions.iter().map(|&at| Vec3::from(at)));
             let triples = primitive.indices.as_chunks().0;

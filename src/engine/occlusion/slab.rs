@@ -21,6 +21,11 @@ pub(super) struct Slab {
 }
 
 impl Slab {
+    /// Square metres.
+    pub fn area(&self) -> f32 {
+        4.0 * self.half[0].cross(self.half[1]).length()
+    }
+
     /// About the part of a sphere, seen from the middle of it, that a face takes; no more than 1.
     pub fn part_of_view(&self, from_eye: Vec3) -> f32 {
         let [u, v] = self.half;

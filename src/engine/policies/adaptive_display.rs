@@ -185,25 +185,27 @@ impl AdaptiveDisplay {
         None
     }
 
-    /// The incremental algorithm (section 5 of the paper), from the front of the frame before.
-    fn improve(&mut self, frame: &FrameInput<'_>, mut ms: f64) {
+    /// The incremental algorithm (section 5 of the paper), from the front of the frame before, of `ms`
+    /// milliseconds; what the front takes that it comes to.
+    fn improve(&mut self, frame: &FrameInput<'_>, mut ms: f64) -> f64 {
         while ms > frame.budget_ms {
-            let Some(node) = self.worst_downgrade(frame) else { return };
+            let Some(node) = self.worst_downgrade(frame) else { return ms };
             ms -= self.downgrade(frame, node);
         }
         while let Some(up) = self.best_upgrade() {
             let value = self.value(frame, up);
             ms += self.upgrade(frame, up);
             while ms > frame.budget_ms {
-                let Some(down) = self.worst_downgrade(frame) else { return };
+                let Some(down) = self.worst_downgrade(frame) else { return ms };
                 // Of two that are worth as much, none makes way for the other.
                 if down == up || self.value(frame, down) >= value {
-                    self.downgrade(frame, up);
-                    return;
+                    ms -= self.downgrade(frame, up);
+                    return ms;
                 }
                 ms -= self.downgrade(frame, down);
             }
         }
+        ms
     }
 }
 
@@ -227,13 +229,15 @@ impl Policy for AdaptiveDisplay {
             }
         }
         out.front.extend(visited.iter().filter(|(_, refined)| !refined).map(|&(node, _)| node));
-        let ms = front_ms(frame, &out.front);
-        self.improve(frame, ms);
+        let ms = self.improve(frame, front_ms(frame, &out.front));
         out.front.clear();
         out.requests.extend(frame.tree.roots().iter().map(|&root| (root, f64::MAX)));
         self.walk(frame, |policy, node, refined| {
             if !refined {
                 out.front.push(node);
+                if refining_ms(frame, node) <= frame.budget_ms - ms {
+                    out.lacking += frame.missing_children(node);
+                }
             }
             let children = frame.tree.children(node);
             if !children.is_empty() {

@@ -157,10 +157,13 @@ impl BestFirst {
             self.consider(frame, root, out);
         }
         while let Some(Ranked { rank, node }) = self.candidates.pop() {
+            let more_ms = refining_ms(frame, node);
             if !frame.can_refine(node) {
+                if more_ms <= left_ms {
+                    out.lacking += frame.missing_children(node);
+                }
                 continue; // its children are asked for
             }
-            let more_ms = refining_ms(frame, node);
             if more_ms > left_ms && rank < f64::INFINITY {
                 break;
             } else if more_ms > left_ms {

@@ -34,6 +34,7 @@ pub(super) fn descend(
                 queue.extend(children);
                 continue;
             }
+            out.lacking += frame.missing_children(node);
         }
         out.front.push(node);
     }

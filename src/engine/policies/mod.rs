@@ -34,8 +34,8 @@ pub struct PolicyKind {
 
 /// All policies; the first is the default.
 pub const POLICIES: [PolicyKind; 7] = [
-    best_first::KIND,
     gain_over_price::KIND,
+    best_first::KIND,
     lakhia::KIND,
     adaptive_display::KIND,
     screen_area::KIND,

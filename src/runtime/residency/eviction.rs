@@ -26,14 +26,18 @@ impl Residency {
             reservations.tried += 1;
             return false;
         }
-        let needed = self.needed_bytes(node);
-        if needed <= self.budget.free() && self.missing(node, reservations) == 0 {
+        if self.fits(node, reservations) {
             return true;
         }
         reservations.tried += 1;
-        reservations.bytes += needed;
+        reservations.bytes += self.needed_bytes(node);
         reservations.nodes.push(node);
         false
+    }
+
+    /// Whether a node fits now, beside what is reserved for more important ones.
+    pub(super) fn fits(&self, node: u32, reservations: &Reservations) -> bool {
+        self.needed_bytes(node) <= self.budget.free() && self.missing(node, reservations) == 0
     }
 
     /// Bytes that loading a node takes now.
@@ -150,6 +154,6 @@ impl Residency {
 
     /// Bytes that are free for certain once a node is gone; shared pictures may stay.
     fn least_freed(&self, node: u32) -> u64 {
-        self.sizes.nodes[node as usize].held_bytes
+        self.sizes.nodes[node as usize].bytes()
     }
 }

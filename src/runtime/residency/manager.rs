@@ -15,6 +15,17 @@ const CANDIDATES: usize = 16;
 /// uploads all that has come meanwhile.
 const MOST_FRAME_S: f64 = 0.1;
 
+/// What may be wanted soon, and may not, is loaded at this part of the rate at which nodes become
+/// resident.
+const AHEAD: f64 = 0.1;
+
+/// Where nothing was, it may make up for so many seconds.
+const AHEAD_S: f64 = 0.25;
+
+/// This part of the memory is left free by it. Measured: with nothing left free, orbits under a cap of a
+/// quarter of the scene read a fifth to a half more.
+const LEFT_FREE: f64 = 0.25;
+
 /// Nodes a second that the last frame did not visit whose priorities are looked at again.
 const STALE_PER_S: f64 = 2_000.0;
 
@@ -49,8 +60,9 @@ fn record(tree: &SceneTree, sizes: &Sizes, node: u32) -> NodeRecord {
         parent: tree.node(node).parent,
         children_held: 0,
         visited: 0,
+        ahead: 0,
         needed: 0,
-        held_bytes: sizes.nodes[node as usize].held_bytes,
+        bytes: sizes.nodes[node as usize].bytes(),
         recent: RecentPriority::default(),
     }
 }
@@ -73,6 +85,7 @@ impl Residency {
             frame_s: 0.0,
             missed: Vec::new(),
             upload_bytes: 0,
+            ahead_bytes: 0.0,
             arrivals: Vec::new(),
             leaving: Vec::new(),
             orphans: Vec::new(),
@@ -131,7 +144,7 @@ impl Residency {
         self.span = RecentPriority::span(self.now_s);
         for &(node, priority) in visited {
             let record = &mut self.nodes[node as usize];
-            self.requested_bytes += record.held_bytes;
+            self.requested_bytes += record.bytes;
             record.visited = self.frame;
             record.recent.update(self.span, priority);
             if record.state != NodeState::Resident {
@@ -143,6 +156,16 @@ impl Residency {
         }
         self.list.update(visited);
         self.list.update(others);
+    }
+
+    /// Takes nodes that may be wanted soon, none of which the frame visited, after those that it did.
+    pub fn set_ahead(&mut self, ahead: &[(u32, f64)]) {
+        for &(node, priority) in ahead {
+            let record = &mut self.nodes[node as usize];
+            (record.visited, record.ahead) = (self.frame, self.frame);
+            record.recent.update(self.span, priority);
+        }
+        self.list.update(ahead);
     }
 
     /// Says which nodes the frame draws, or could not draw their siblings without. Together with
@@ -184,6 +207,13 @@ impl Residency {
                 NodeState::Absent if self.nodes[node as usize].visited != self.frame => {
                     self.list.remove(node); // no longer of interest to anyone
                 }
+                NodeState::Absent if self.is_ahead(node) => {
+                    if self.may_load_ahead(node) && self.fits(node, &reservations) {
+                        self.ahead_bytes -= self.nodes[node as usize].bytes as f64;
+                        self.begin(node);
+                        return Some(self.chunk(node));
+                    }
+                }
                 NodeState::Absent if self.wants(node) && self.reserve(node, &mut reservations) => {
                     self.begin(node);
                     return Some(self.chunk(node));
@@ -198,6 +228,21 @@ impl Residency {
             }
         }
         None
+    }
+
+    /// It may be wanted soon, and is not yet.
+    fn is_ahead(&self, node: u32) -> bool {
+        self.nodes[node as usize].ahead == self.frame
+    }
+
+    /// Whether a node that may be wanted soon can be loaded now, if it fits. Nothing is ever evicted for it,
+    /// a part of the memory is left to what is wanted, and what was evicted once is read again only when it
+    /// is wanted.
+    fn may_load_ahead(&self, node: u32) -> bool {
+        let used = self.budget.used() + self.nodes[node as usize].bytes;
+        let most = (1.0 - LEFT_FREE) * self.options.max_memory_bytes as f64;
+        let is_new = !self.loaded_before[node as usize];
+        is_new && self.ahead_bytes > 0.0 && used as f64 <= most && self.wants(node)
     }
 
     /// Visited in the last frame, not in memory, and the parent is.
@@ -267,6 +312,9 @@ impl Residency {
         self.now_s += dt_s.max(0.0);
         self.frame_s = dt_s.clamp(0.0, MOST_FRAME_S);
         self.upload_bytes = (self.options.upload_bytes_per_s as f64 * self.frame_s) as u64;
+        let ahead_bytes_per_s = AHEAD * self.options.upload_bytes_per_s as f64;
+        let most = ahead_bytes_per_s * AHEAD_S;
+        self.ahead_bytes = (self.ahead_bytes + ahead_bytes_per_s * self.frame_s).min(most);
         let mut changes = Changes::default();
         for node in std::mem::take(&mut self.leaving) {
             self.forget(node, NodeState::Absent, &mut changes.left_textures);

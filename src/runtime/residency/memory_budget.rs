@@ -33,7 +33,7 @@ impl MemoryBudget {
     pub fn held(&self, sizes: &Sizes, node: u32) -> u64 {
         let size = &sizes.nodes[node as usize];
         let unused = size.textures.iter().filter(|&&texture| self.users[texture as usize] == 0);
-        size.held_bytes + unused.map(|&t| sizes.textures[t as usize].held_bytes).sum::<u64>()
+        size.bytes() + unused.map(|&t| sizes.textures[t as usize].held_bytes).sum::<u64>()
     }
 
     /// Reserves bytes for a node and for what is read of its files; the caller has seen that they are free.
@@ -61,7 +61,7 @@ impl MemoryBudget {
         orphans: &mut Vec<u32>,
     ) {
         let size = &sizes.nodes[node as usize];
-        self.used -= size.held_bytes;
+        self.used -= size.bytes();
         for &texture in &size.textures {
             match self.users[texture as usize] == 1 && in_memory[texture as usize] {
                 true => orphans.push(texture),
@@ -83,7 +83,7 @@ impl MemoryBudget {
     /// Gives back what a node held; calls `gone` with shared pictures that nobody needs any more.
     pub fn release(&mut self, sizes: &Sizes, node: u32, mut gone: impl FnMut(u32)) {
         let size = &sizes.nodes[node as usize];
-        self.used -= size.held_bytes;
+        self.used -= size.bytes();
         for &texture in &size.textures {
             self.release_texture(sizes, texture, &mut gone);
         }

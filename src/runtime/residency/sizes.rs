@@ -9,8 +9,17 @@ pub struct NodeSize {
     pub file_bytes: u64,
     /// Of its geometry and its own pictures as held for drawing.
     pub held_bytes: u64,
+    /// Of what is held beside it, and not for drawing.
+    pub beside_bytes: u64,
     /// Indices of the shared pictures that it needs.
     pub textures: Vec<u32>,
+}
+
+impl NodeSize {
+    /// Of all that is held of it, shared pictures apart.
+    pub fn bytes(&self) -> u64 {
+        self.held_bytes + self.beside_bytes
+    }
 }
 
 /// Bytes of one picture that nodes share.
@@ -49,6 +58,7 @@ impl Sizes {
                 NodeSize {
                     file_bytes: entry.file_bytes,
                     held_bytes: node(entry.vertices, entry.triangles, &entry.pictures),
+                    beside_bytes: 0,
                     textures,
                 }
             })
@@ -62,5 +72,13 @@ impl Sizes {
             })
             .collect();
         Self { nodes, textures }
+    }
+
+    /// The same with what is held beside nodes, by their index.
+    pub fn with_beside(mut self, bytes: impl Fn(u32) -> u64) -> Self {
+        for (size, node) in self.nodes.iter_mut().zip(0..) {
+            size.beside_bytes = bytes(node);
+        }
+        self
     }
 }

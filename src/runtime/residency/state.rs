@@ -63,10 +63,12 @@ pub(super) struct NodeRecord {
     pub children_held: u32,
     /// The frame in which it was visited last.
     pub visited: u32,
+    /// The frame in which it was last said that it may be wanted soon.
+    pub ahead: u32,
     /// The last frame in which it was drawn, or its children were visited in its place.
     pub needed: u32,
-    /// As in [`Sizes`].
-    pub held_bytes: u64,
+    /// [`NodeSize::bytes`](super::NodeSize::bytes).
+    pub bytes: u64,
     pub recent: RecentPriority,
 }
 
@@ -99,6 +101,8 @@ pub struct Residency {
     pub(super) missed: Vec<u32>,
     /// Bytes that a frame uploads at most, if it takes as long as the last one did.
     pub(super) upload_bytes: u64,
+    /// Bytes of nodes that may be wanted soon that can begin to load now.
+    pub(super) ahead_bytes: f64,
     /// Loaded, in the order in which they were.
     pub(super) arrivals: Vec<u32>,
     /// Leaving.

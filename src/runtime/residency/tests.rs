@@ -12,7 +12,7 @@ const HELD: u64 = 500;
 const FILE: u64 = 1000;
 
 fn sizes(nodes: usize) -> Sizes {
-    let node = NodeSize { file_bytes: FILE, held_bytes: HELD, textures: Vec::new() };
+    let node = NodeSize { file_bytes: FILE, held_bytes: HELD, ..NodeSize::default() };
     Sizes { nodes: vec![node; nodes], textures: Vec::new() }
 }
 
@@ -53,7 +53,7 @@ fn check(residency: &Residency, tree: &SceneTree, sizes: &Sizes, cap: u64) {
         let held = !matches!(state, NodeState::Absent | NodeState::Broken);
         let size = &sizes.nodes[node as usize];
         if held {
-            used += size.held_bytes;
+            used += size.bytes();
             size.textures.iter().for_each(|&texture| textures[texture as usize] = true);
         }
         if matches!(state, NodeState::Loading { .. }) {
@@ -134,6 +134,48 @@ fn what_is_no_longer_visited_is_not_loaded() {
     residency.set_priorities(&[(0, 9.0)], &[]);
     assert_eq!(residency.next_step(), None);
     assert_eq!(residency.waiting(), 0);
+}
+
+#[test]
+fn what_may_be_wanted_soon_is_loaded_at_a_tenth_of_the_rate_and_given_up_when_it_is_not() {
+    let tree = two_levels();
+    let many = ResidencyOptions { upload_bytes_per_s: 100 * HELD, ..options(1 << 20) };
+    let mut residency = started(&tree, sizes(7), many);
+    let ahead = [(1, 2.0), (2, 1.5), (4, 1.0), (5, 1.0)];
+    let mut loaded = Vec::new();
+    for _ in 0..20 {
+        residency.begin_frame(0.01);
+        residency.set_priorities(&[(0, 9.0)], &[]);
+        residency.set_ahead(&ahead);
+        assert_eq!(residency.waiting(), 0, "nothing is missing yet");
+        loaded.push(load_all(&mut residency));
+    }
+    // A tenth of a node in each frame: one at once, and one each time that it is paid for.
+    assert_eq!(loaded.concat(), [1, 2, 4]);
+    assert!(loaded[0] == [1] && loaded.iter().all(|nodes| nodes.len() <= 1));
+    // What is visited does not wait.
+    residency.begin_frame(0.01);
+    residency.set_priorities(&[(0, 9.0), (4, 3.0), (5, 3.0)], &[]);
+    assert_eq!(load_all(&mut residency), [5]);
+    residency.set_ahead(&[(6, 1.0)]);
+    residency.set_priorities(&[(0, 9.0)], &[]);
+    residency.begin_frame(10.0);
+    assert_eq!(residency.next_step(), None);
+}
+
+#[test]
+fn nothing_is_evicted_for_what_may_be_wanted_soon() {
+    let tree = two_levels();
+    let mut residency = started(&tree, sizes(7), options(2 * HELD + HELD + FILE));
+    assert_eq!(settle(&mut residency, &[(0, 9.0), (1, 3.0), (4, 2.0)]), (vec![1, 4], vec![]));
+    for _ in 0..130 {
+        assert!(residency.begin_frame(FRAME_S).left.is_empty());
+        residency.set_priorities(&[(0, 9.0), (1, 3.0)], &[(4, 0.1)]);
+        residency.set_ahead(&[(2, 2.0)]);
+        assert!(load_all(&mut residency).is_empty());
+    }
+    // For what is visited it is.
+    assert_eq!(settle(&mut residency, &[(0, 9.0), (1, 3.0), (2, 2.0)]), (vec![2], vec![4]));
 }
 
 #[test]
@@ -314,7 +356,8 @@ fn promises_hold_whatever_happens() {
             nodes: (0..tree.len())
                 .map(|_| NodeSize {
                     file_bytes: 1 + random(900),
-                    held_bytes: 1 + random(700),
+                    held_bytes: 1 + random(600),
+                    beside_bytes: random(100),
                     textures: (0..random(3)).map(|texture| texture as u32).collect(),
                 })
                 .collect(),

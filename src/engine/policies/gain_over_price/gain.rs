@@ -1,6 +1,8 @@
 //! What the image gains where a node gives way to its children.
 
+use crate::camera::View;
 use crate::engine::{FrameInput, SeenAreas};
+use crate::runtime::SceneTree;
 
 /// What was seen of a node is half forgotten after so many seconds.
 const HALF_LIFE_S: f64 = 5.0;
@@ -37,7 +39,7 @@ impl Gain {
     pub fn of(&mut self, frame: &FrameInput<'_>, node: u32) -> f64 {
         let per_metre = frame.tree.pixels_per_metre(node, frame.view);
         let part = self.seen(frame, node) * per_metre * per_metre;
-        part.min(1.0) * removed(frame, node, per_metre)
+        part.min(1.0) * removed(frame.tree, node, per_metre)
     }
 
     /// The most that was seen of a node, of late.
@@ -57,20 +59,27 @@ impl Gain {
         area
     }
 
+    /// The same from another view, as far as is seen of nodes as a rule.
+    pub fn expected(tree: &SceneTree, node: u32, view: &View) -> f64 {
+        let per_metre = tree.pixels_per_metre(node, view);
+        let part = SeenAreas::usual(tree, node, view) * per_metre * per_metre;
+        part.min(1.0) * removed(tree, node, per_metre)
+    }
+
     /// The same of what need not be in view, where all of it would be seen.
     pub fn anywhere(frame: &FrameInput<'_>, node: u32) -> f64 {
         let per_metre = frame.tree.pixels_per_metre(node, frame.view);
         let [min, max] = frame.tree.node(node).bbox;
         let [width, height] = frame.view.size.map(f64::from);
         let pixels = (max - min).length() / 2.0 * per_metre;
-        (pixels * pixels / (width * height)).min(1.0) * removed(frame, node, per_metre)
+        (pixels * pixels / (width * height)).min(1.0) * removed(frame.tree, node, per_metre)
     }
 }
 
 /// How much less wrong each pixel of a node is by its children.
-fn removed(frame: &FrameInput<'_>, node: u32, per_metre: f64) -> f64 {
-    let (at, children) = (frame.tree.node(node), frame.tree.children(node));
+fn removed(tree: &SceneTree, node: u32, per_metre: f64) -> f64 {
+    let (at, children) = (tree.node(node), tree.children(node));
     let wrong = |error: f64| (error * per_metre).sqrt();
-    let errors = children.iter().map(|&child| wrong(frame.tree.node(child).mean_error));
+    let errors = children.iter().map(|&child| wrong(tree.node(child).mean_error));
     (wrong(at.mean_error) - errors.sum::<f64>() / children.len().max(1) as f64).max(0.0)
 }

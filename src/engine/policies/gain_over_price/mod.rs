@@ -8,6 +8,7 @@
 //! time, unless its rank has doubled meanwhile: a camera that sways comes to rest. What is out of view
 //! keeps its level.
 
+mod ahead;
 mod gain;
 mod levels;
 #[cfg(test)]
@@ -22,8 +23,12 @@ use super::ranked::{
 use super::{PolicyKind, Settings};
 use crate::Result;
 use crate::engine::{FrameInput, Policy, Selection};
+use ahead::Ahead;
 use gain::Gain;
 use levels::Levels;
+
+/// A frame is full from this part of its budget on.
+const FULL: f64 = 0.9;
 
 const NAME: &str = "gain-over-price";
 
@@ -34,15 +39,16 @@ struct Options {
     backoff_s: f64,
     slack: f64,
     away: f64,
+    ahead: f64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { hysteresis: 1.5, dwell_s: 0.5, backoff_s: 16.0, slack: 0.02, away: 0.2 }
+        Self { hysteresis: 1.5, dwell_s: 0.5, backoff_s: 16.0, slack: 0.02, away: 0.2, ahead: 0.2 }
     }
 }
 
-const PARAMETERS: [Parameter<Options>; 5] = [
+const PARAMETERS: [Parameter<Options>; 6] = [
     parameter!(hysteresis, 1.0, 100.0, "how many times higher ranks what others make way for"),
     parameter!(dwell_s, 0.0, 60.0, "seconds for which a node keeps a level, unless time is short"),
     parameter!(
@@ -58,6 +64,12 @@ const PARAMETERS: [Parameter<Options>; 5] = [
         "part of its time by which a frame is longer before it is relieved"
     ),
     parameter!(away, 0.0, 1.0, "what a node out of view is worth in memory, over one in view"),
+    parameter!(
+        ahead,
+        0.0,
+        1.0,
+        "what a node that is expected in a second is worth, over one in view"
+    ),
 ];
 
 pub(super) const KIND: PolicyKind = PolicyKind {
@@ -76,6 +88,7 @@ struct GainOverPrice {
     options: Options,
     gain: Gain,
     levels: Levels,
+    ahead: Ahead,
     /// By node: its rank, where it was visited in the frame at hand.
     ranks: Vec<f64>,
     /// Nodes that could be refined, the highest rank first.
@@ -183,8 +196,8 @@ impl GainOverPrice {
         ms
     }
 
-    /// Refines while there is time, or what makes way.
-    fn refine(&mut self, frame: &FrameInput<'_>, mut ms: f64) {
+    /// Refines while there is time, or what makes way; milliseconds that the frame then takes.
+    fn refine(&mut self, frame: &FrameInput<'_>, mut ms: f64) -> f64 {
         while let Some(Ranked { rank, node }) = self.upgrades.pop() {
             let least = self.worst(frame).map_or(0.0, |worst| self.ranks[worst as usize]);
             if self.levels.rests(node, rank, least) {
@@ -197,6 +210,7 @@ impl GainOverPrice {
             ms = more_ms - freed_ms;
             self.upgrade(frame, node);
         }
+        ms
     }
 
     /// Coarsens what ranks so much lower than `rank` that it makes way, until `over_ms` are freed;
@@ -224,6 +238,24 @@ impl GainOverPrice {
         }
         self.way = way;
         is_enough.then_some(freed_ms)
+    }
+
+    /// How many nodes would be drawn in a frame of `ms` milliseconds, were they in memory, where the
+    /// least rank of what is refined is `least`.
+    fn lacking(&self, frame: &FrameInput<'_>, ms: f64, least: f64) -> u32 {
+        let makes_way = |rank: f64| rank > least * self.options.hysteresis;
+        let fits = |node: u32| ms + refining_ms(frame, node) <= frame.budget_ms;
+        let would_be_refined = |&node: &u32| {
+            let rank = self.ranks[node as usize];
+            rank > 0.0
+                && !self.levels.is_refined(node)
+                && !frame.can_refine(node)
+                && !frame.is_hidden(node)
+                && !self.levels.rests(node, rank, least)
+                && (fits(node) || makes_way(rank))
+        };
+        let nodes = self.visited.iter().copied().filter(would_be_refined);
+        nodes.map(|node| frame.missing_children(node)).sum()
     }
 
     /// What is wanted in memory: the children of what is visited. What is there makes way only for what
@@ -273,7 +305,8 @@ impl Policy for GainOverPrice {
         }
         self.front_into(out);
         let ms = self.relieve(frame, front_ms(frame, &out.front));
-        self.refine(frame, ms);
+        let ms = self.refine(frame, ms);
+        let least = self.worst(frame).map_or(0.0, |worst| self.ranks[worst as usize]);
         if self.levels.have_changed() {
             self.walk(frame);
             self.front_into(out);
@@ -282,7 +315,11 @@ impl Policy for GainOverPrice {
             self.walk(frame);
             self.front_into(out);
         }
+        out.lacking = self.lacking(frame, ms, least);
         self.request(frame, out);
+        // Where there is time, whatever comes into view will be refined.
+        let is_full = ms > FULL * frame.budget_ms;
+        self.ahead.request(frame, if is_full { least } else { 0.0 }, &self.options, out);
         count_culled(frame, out);
     }
 

@@ -100,6 +100,13 @@ impl Lakhia {
                 residents.contains(node) || !(scored.visible || self.options.all_siblings > 0.0)
             });
             self.drawn.refused |= !allowed;
+            if allowed && !resident {
+                let is_missing = |&(&node, scored): &(&u32, &NodeScore)| {
+                    scored.visible && !residents.contains(node)
+                };
+                let missing = indices.iter().zip(&self.scores).filter(is_missing).count();
+                out.lacking += missing as u32;
+            }
             if !(resident && allowed) {
                 return self.draw(index, node, out);
             }
