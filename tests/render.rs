@@ -12,7 +12,8 @@ use glam::{DQuat, DVec3};
 use hlod::camera::Pose;
 use hlod::format::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 use hlod::mesh::{AlphaMode, Wrap};
-use hlod::render::content::{Content, Picture};
+use hlod::picture_error::mean_squared_error;
+use hlod::render::content::{Content, Picture, TextureFormat};
 use hlod::render::{RenderOptions, Renderer, Shading, level_tint};
 use image::{Rgba, RgbaImage};
 
@@ -429,6 +430,67 @@ fn exactly_the_front_is_drawn_and_memory_comes_back() {
     renderer.remove(4_000_000_000);
     assert_eq!(renderer.gpu_bytes(), 0);
     renderer.draw(&[], &pose(), 0.1).unwrap();
+}
+
+/// A wall with its picture, which is seen texel by pixel and as small as a quarter of that.
+fn facade() -> NodeMesh {
+    let photograph = RgbaImage::from_fn(SIZE, SIZE, |x, y| {
+        let window = (x % 16 > 4 && y % 12 > 3) as u32;
+        let noise = (x * 7919 + y * 104_729) % 23;
+        let [r, g, b] = [180 - window * 110, 150 - window * 60, 120 + window * 20];
+        Rgba([(r + noise) as u8, (g + noise) as u8, (b + noise) as u8, 255])
+    });
+    let textured = || Surface { image: Some(0), ..plain([1.0; 3]) };
+    NodeMesh {
+        images: vec![png(&photograph)],
+        ..mesh(vec![
+            rectangle([-1.0, 1.0], [-1.0, 1.0], 1.0, textured()),
+            rectangle([-0.2, 0.3], [-0.2, 0.3], 0.9, textured()),
+        ])
+    }
+}
+
+#[test]
+fn compressed_pictures_take_a_quarter_and_look_the_same() {
+    let Some(mut renderer) = renderer(&options()) else { return };
+    let Ok(()) = renderer.check_textures(TextureFormat::Bc7) else {
+        eprintln!("{} has no BC7", renderer.adapter());
+        return;
+    };
+    let original = content(&facade());
+    let mut draw = |content: &Content| {
+        renderer.upload(0, 0, content).unwrap();
+        assert_eq!(renderer.gpu_bytes(), content.bytes());
+        renderer.draw(&[0], &pose(), 0.1).unwrap();
+        let texture_bytes: u64 = content.pictures.iter().map(Picture::bytes).sum();
+        (image::DynamicImage::from(renderer.snapshot().unwrap()).into_rgb8(), texture_bytes)
+    };
+    let (expected, bytes) = draw(&original);
+    let (found, compressed_bytes) = draw(&original.clone().stored_as(TextureFormat::Bc7));
+    let quarter = compressed_bytes as f64 / bytes as f64;
+    assert!((0.25..0.255).contains(&quarter), "{compressed_bytes} of {bytes}");
+    // 34 dB, as is stated of any picture; it is compressed at all.
+    let error = mean_squared_error(&expected, &found).unwrap();
+    assert!(error > 0.0 && error < 255.0f64.powi(2) / 10f64.powf(3.4), "{error}");
+}
+
+#[test]
+fn small_levels_of_compressed_pictures_are_whole() {
+    // From so far away that levels are seen that are smaller than a block, and of sizes that are no
+    // multiples of it.
+    let image = RgbaImage::from_pixel(12, 20, Rgba([200, 100, 50, 255]));
+    let surface = Surface { image: Some(0), ..plain([1.0; 3]) };
+    for far in [1.0, 4.0, 12.0, 24.0] {
+        let wall = rectangle([-1.0, 1.0], [-1.0, 1.0], far, surface.clone());
+        let scene = NodeMesh { images: vec![png(&image)], ..mesh(vec![wall]) };
+        let Some(mut renderer) = renderer(&options()) else { return };
+        if renderer.check_textures(TextureFormat::Bc7).is_err() {
+            return;
+        }
+        renderer.upload(0, 0, &content(&scene).stored_as(TextureFormat::Bc7)).unwrap();
+        renderer.draw(&[0], &pose(), 0.1).unwrap();
+        assert_near(at(&renderer.snapshot().unwrap(), 0.01, 0.01), [200, 100, 50], 1);
+    }
 }
 
 #[test]

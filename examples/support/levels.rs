@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use hlod::format::{NODES_DIR, Scene, TEXTURES_DIR};
 use hlod::render::Renderer;
-use hlod::render::content::{Content, Picture, held_bytes, picture_bytes};
+use hlod::render::content::{Content, Picture, TextureFormat, held_bytes, picture_bytes};
 
 type Result<T, E = Box<dyn Error>> = std::result::Result<T, E>;
 
@@ -42,7 +42,7 @@ pub fn upload(scene: &Scene, out: &Path, front: &[u32], renderer: &mut Renderer)
         renderer.upload_shared(index, &picture)?;
         decoding += decoded - begin;
         uploading += decoded.elapsed();
-        foretold += picture_bytes(texture.width, texture.height);
+        foretold += picture_bytes(size, TextureFormat::Rgba8);
     }
     for (index, node) in nodes() {
         let file = out.join(NODES_DIR).join(&node.file);
@@ -52,7 +52,7 @@ pub fn upload(scene: &Scene, out: &Path, front: &[u32], renderer: &mut Renderer)
         renderer.upload(index, node.level, &content)?;
         decoding += decoded - begin;
         uploading += decoded.elapsed();
-        foretold += held_bytes(node.vertices, node.triangles, &node.pictures);
+        foretold += held_bytes(node.vertices, node.triangles, &node.pictures, TextureFormat::Rgba8);
     }
     let begin = Instant::now();
     renderer.finish_uploads()?;

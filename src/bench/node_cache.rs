@@ -34,9 +34,13 @@ pub struct NodeCache<R> {
 impl<R: BorrowMut<Renderer>> NodeCache<R> {
     /// An empty one, to hold at most `cap_bytes`, or what is wanted at once where that is more.
     pub fn new(tree: SceneTree, files: NodeFiles, renderer: R, cap_bytes: u64) -> Self {
-        let picture = |[width, height]: [u32; 2]| picture_bytes(width, height);
+        let format = files.texture_format();
         Self {
-            sizes: Sizes::new(files.scene(), held_bytes, picture),
+            sizes: Sizes::new(
+                files.scene(),
+                |vertices, triangles, own| held_bytes(vertices, triangles, own, format),
+                |size| picture_bytes(size, format),
+            ),
             tree,
             files,
             renderer,

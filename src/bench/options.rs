@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::engine::Policy;
 use crate::engine::policies::{POLICIES, PolicyKind, Settings};
+use crate::render::content::TextureFormat;
 use crate::runtime::residency::ResidencyOptions;
 use crate::{Error, Result};
 
@@ -24,6 +25,9 @@ pub struct BenchOptions {
     pub warm_up_frames: u64,
     /// Whether what is hidden by what is before it is left out.
     pub cull_hidden: bool,
+    /// How textures are stored, as far as they [can be](TextureFormat::of_picture); memory is counted
+    /// so, drawn or not. RGBA8.
+    pub textures: TextureFormat,
     /// Seed of the model clock's noise and stalls.
     pub seed: u64,
 }
@@ -38,6 +42,7 @@ impl Default for BenchOptions {
             size: Size::default(),
             warm_up_frames: 0,
             cull_hidden: true,
+            textures: TextureFormat::Rgba8,
             seed: 0,
         }
     }

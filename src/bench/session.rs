@@ -12,7 +12,7 @@ use crate::camera::CameraPath;
 use crate::engine::{CostModel, NodeOcclusion, Occluders, Policy};
 use crate::format::Scene;
 use crate::loading::NodeFiles;
-use crate::render::content::{held_bytes, picture_bytes};
+use crate::render::content::{TextureFormat, held_bytes, picture_bytes};
 use crate::runtime::SceneTree;
 use crate::runtime::residency::{Residency, Sizes};
 
@@ -57,6 +57,27 @@ impl Session {
         self.tree.clone().with_textured_weight(&self.scene, constants.textured_weight)
     }
 
+    /// The format of textures that suits this scene under a cap: `preferred` where it would not all fit as
+    /// decoded, and otherwise RGBA8, which loses nothing.
+    pub fn suitable_textures(
+        &self,
+        max_memory_bytes: u64,
+        preferred: TextureFormat,
+    ) -> TextureFormat {
+        let sizes = self.sizes(TextureFormat::Rgba8);
+        let nodes = sizes.nodes.iter().map(|node| node.held_bytes);
+        let all: u64 = nodes.chain(sizes.textures.iter().map(|texture| texture.held_bytes)).sum();
+        if all > max_memory_bytes { preferred } else { TextureFormat::Rgba8 }
+    }
+
+    fn sizes(&self, format: TextureFormat) -> Sizes {
+        Sizes::new(
+            &self.scene,
+            |vertices, triangles, own| held_bytes(vertices, triangles, own, format),
+            |size| picture_bytes(size, format),
+        )
+    }
+
     fn residency(
         &self,
         options: &BenchOptions,
@@ -73,9 +94,7 @@ impl Session {
                 _ => hides,
             }
         };
-        let sizes =
-            Sizes::new(&self.scene, held_bytes, |[width, height]| picture_bytes(width, height))
-                .with_beside(occlusion);
+        let sizes = self.sizes(options.textures).with_beside(occlusion);
         Ok(Arc::new(Mutex::new(Residency::new(&self.tree, sizes, options.residency)?)))
     }
 
@@ -162,15 +181,17 @@ impl Session {
         progress: impl FnMut(&FrameRecord) -> bool,
     ) -> Result<(Run, Context)> {
         options.check()?;
+        renderer.check_textures(options.textures)?;
         // Roots that do not fit are told of before anything is loaded.
         let mut policy = options.policy.make()?;
         let residency = self.residency(&options, &*policy)?;
+        let files = self.files().with_textures(options.textures);
         let weight = constants.unwrap_or_default();
         let tree = self.tree_for(&weight);
         let constants = match constants {
             Some(constants) => constants,
             None => ClockConstants {
-                prices: super::measure_start(renderer, &tree, self.files(), path)?,
+                prices: super::measure_start(renderer, &tree, files.clone(), path)?,
                 ..ClockConstants::default()
             },
         };
@@ -186,7 +207,7 @@ impl Session {
         let occluders = self.occluders(&*policy);
         let mut backend = super::GpuBackend::new(
             &tree,
-            if options.cull_hidden { self.files().with_occlusion() } else { self.files() },
+            if options.cull_hidden { files.with_occlusion() } else { files },
             renderer,
             Arc::clone(&residency),
             snapshots,

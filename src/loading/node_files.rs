@@ -10,7 +10,7 @@ use rustc_hash::FxHashMap;
 
 use crate::engine::NodeOcclusion;
 use crate::format::{NODES_DIR, NodeMesh, Scene, TEXTURES_DIR, file_crc, read_glb};
-use crate::render::content::{Content, Picture};
+use crate::render::content::{Content, Picture, TextureFormat};
 use crate::{Error, Result};
 
 /// The files of a built scene.
@@ -20,6 +20,7 @@ pub struct NodeFiles {
     scene: Arc<Scene>,
     textures: FxHashMap<String, u32>,
     with_occlusion: bool,
+    format: TextureFormat,
 }
 
 /// A node that was read and decoded.
@@ -56,12 +57,28 @@ impl NodeFiles {
             .zip(0..)
             .map(|(texture, index)| (texture.file_name.clone(), index))
             .collect();
-        Self { dir: dir.to_owned(), scene, textures, with_occlusion: false }
+        Self {
+            dir: dir.to_owned(),
+            scene,
+            textures,
+            with_occlusion: false,
+            format: TextureFormat::Rgba8,
+        }
     }
 
     /// Has nodes arrive with what they hide.
     pub fn with_occlusion(self) -> Self {
         Self { with_occlusion: true, ..self }
+    }
+
+    /// Has pictures arrive in a format, as far as they [can be](TextureFormat::of_picture).
+    pub fn with_textures(self, format: TextureFormat) -> Self {
+        Self { format, ..self }
+    }
+
+    /// The format in which pictures arrive that can.
+    pub fn texture_format(&self) -> TextureFormat {
+        self.format
     }
 
     /// The scene.
@@ -95,14 +112,16 @@ impl NodeFiles {
         let Reading { node, files, textures, bytes, .. } = reading;
         let (path, _) = &files[0];
         let (glb, mut rest) = self.checked(node, path, &bytes)?;
-        let content = Content::decode(path, glb, |name| self.textures.get(name).copied())?;
+        let content = Content::decode(path, glb, |name| self.textures.get(name).copied())?
+            .stored_as(self.format);
         let mut pictures = Vec::with_capacity(textures.len());
         for (&texture, (path, size)) in textures.iter().zip(&files[1..]) {
             let (bytes, after) = rest.split_at_checked(*size as usize).ok_or_else(|| {
                 Error::input(path, format!("expected {size} bytes, found {}", rest.len()))
             })?;
             let entry = &self.scene.shared_textures[texture as usize];
-            pictures.push((texture, Picture::decode(path, bytes, [entry.width, entry.height])?));
+            let picture = Picture::decode(path, bytes, [entry.width, entry.height])?;
+            pictures.push((texture, picture.stored_as(self.format)));
             rest = after;
         }
         let occlusion =

@@ -2,9 +2,10 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use wgpu::{Adapter, DeviceDescriptor, MemoryHints, PollType, Queue, SubmissionIndex};
+use wgpu::{Adapter, DeviceDescriptor, Features, MemoryHints, PollType, Queue, SubmissionIndex};
 
 use super::adapter::{self, AdapterLabel};
+use super::content::{LONGEST_COMPRESSED, TextureFormat};
 use super::timestamps;
 use crate::{Error, Result};
 
@@ -33,7 +34,8 @@ impl Device {
     fn try_open(adapter: &Adapter) -> Result<Self, wgpu::RequestDeviceError> {
         let (device, queue) = pollster::block_on(adapter.request_device(&DeviceDescriptor {
             label: Some("hlod"),
-            required_features: adapter.features() & timestamps::FEATURES,
+            required_features: adapter.features()
+                & (timestamps::FEATURES | Features::TEXTURE_COMPRESSION_BC),
             required_limits: adapter.limits(),
             // Nodes come and go all the time; large blocks set aside for them would be memory
             // that no ledger knows of.
@@ -53,6 +55,17 @@ impl Device {
         });
         let label = adapter::label(adapter);
         Ok(Self { device, queue, label, complaint })
+    }
+
+    /// Whether it samples pictures of a format.
+    pub fn samples(&self, format: TextureFormat) -> bool {
+        match format {
+            TextureFormat::Rgba8 => true,
+            TextureFormat::Bc7 => {
+                self.device.features().contains(Features::TEXTURE_COMPRESSION_BC)
+                    && self.device.limits().max_texture_dimension_2d >= LONGEST_COMPRESSED
+            }
+        }
     }
 
     /// Waits until what was submitted is done.

@@ -6,7 +6,7 @@ use wgpu::{
     TextureDescriptor, TextureDimension, TextureFormat, TextureUsages,
 };
 
-use super::content::Picture;
+use super::content::{self, Picture};
 use super::samplers::Samplers;
 use crate::mesh::Wrap;
 
@@ -32,10 +32,11 @@ impl GpuPicture {
             mip_level_count: levels.len() as u32,
             sample_count: 1,
             dimension: TextureDimension::D2,
-            format: TextureFormat::Rgba8UnormSrgb,
+            format: gpu_format(picture.format()),
             usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
             view_formats: &[],
         });
+        let format = picture.format();
         let mut bytes = 0;
         for (&(size, texels), mip_level) in levels.iter().zip(0..) {
             bytes += texels.len() as u64;
@@ -49,10 +50,11 @@ impl GpuPicture {
                 texels,
                 TexelCopyBufferLayout {
                     offset: 0,
-                    bytes_per_row: Some(size[0] * 4),
+                    bytes_per_row: Some(format.blocks(size)[0] * format.block_bytes()),
                     rows_per_image: None,
                 },
-                extent(size),
+                // Whole blocks, also where they reach beyond the level.
+                extent(format.blocks(size).map(|blocks| blocks * format.block_side())),
             );
         }
         Self { texture, bytes, bindings: Vec::new() }
@@ -85,15 +87,35 @@ impl GpuPicture {
     }
 
     /// What drivers that compile for the picture at hand tell apart: whether its sides are powers
-    /// of two, and whether it has more than one level.
-    pub fn kind(&self) -> [bool; 3] {
-        let (width, height) = (self.texture.width(), self.texture.height());
-        [width.is_power_of_two(), height.is_power_of_two(), self.texture.mip_level_count() > 1]
+    /// of two, whether it has more than one level, and its format.
+    pub fn kind(&self) -> PictureKind {
+        let Self { texture, .. } = self;
+        PictureKind {
+            powers_of_two: [texture.width(), texture.height()].map(u32::is_power_of_two),
+            has_levels: texture.mip_level_count() > 1,
+            format: texture.format(),
+        }
     }
 
     /// What draws bind, once it was prepared.
     pub fn binding(&self, wrap: [Wrap; 2]) -> Option<&BindGroup> {
         self.bindings.iter().find(|(found, _)| *found == wrap).map(|(_, binding)| binding)
+    }
+}
+
+/// What drivers may compile for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct PictureKind {
+    powers_of_two: [bool; 2],
+    has_levels: bool,
+    format: TextureFormat,
+}
+
+/// What a format is to the graphics card: colours are sRGB-encoded.
+fn gpu_format(format: content::TextureFormat) -> TextureFormat {
+    match format {
+        content::TextureFormat::Rgba8 => TextureFormat::Rgba8UnormSrgb,
+        content::TextureFormat::Bc7 => TextureFormat::Bc7RgbaUnormSrgb,
     }
 }
 

@@ -11,7 +11,7 @@ use wgpu::{
 
 use super::adapter::AdapterLabel;
 use super::camera::Camera;
-use super::content::{Content, DrawPicture, Picture};
+use super::content::{Content, DrawPicture, Picture, TextureFormat};
 use super::device::Device;
 use super::gpu_node::GpuNode;
 use super::gpu_picture::GpuPicture;
@@ -133,6 +133,27 @@ impl Renderer {
     /// The adapter that draws.
     pub fn adapter(&self) -> &AdapterLabel {
         &self.device.label
+    }
+
+    /// The format for pictures that suits the adapter: compressed where it is a graphics card that
+    /// samples it. Processors decode every texel they sample, which takes them longer than reading
+    /// four times the bytes.
+    pub fn preferred_textures(&self) -> TextureFormat {
+        match self.device.label.is_processor || !self.device.samples(TextureFormat::Bc7) {
+            true => TextureFormat::Rgba8,
+            false => TextureFormat::Bc7,
+        }
+    }
+
+    /// Fails where the adapter cannot sample a format, before anything is uploaded in it.
+    pub fn check_textures(&self, format: TextureFormat) -> Result<()> {
+        match self.device.samples(format) {
+            true => Ok(()),
+            false => Err(Error::NoAdapter(format!(
+                "{} cannot sample BC7; ask for textures in rgba8",
+                self.device.label
+            ))),
+        }
     }
 
     /// What was asked for.

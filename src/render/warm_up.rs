@@ -10,7 +10,7 @@ use wgpu::BindGroup;
 use super::content::DrawPicture;
 use super::device::Device;
 use super::gpu_node::{GpuDraw, GpuNode};
-use super::gpu_picture::GpuPicture;
+use super::gpu_picture::{GpuPicture, PictureKind};
 use super::pipelines::{PipelineKey, Pipelines};
 use super::target::Target;
 use crate::Result;
@@ -24,7 +24,7 @@ pub(super) struct WarmUp {
 }
 
 /// What a driver may compile for.
-type Kind = (PipelineKey, Option<([Wrap; 2], [bool; 3])>);
+type Kind = (PipelineKey, Option<([Wrap; 2], PictureKind)>);
 
 impl WarmUp {
     pub fn new(device: &Device) -> Self {

@@ -13,6 +13,7 @@ use hlod::format::Scene;
 use hlod::mesh::UpAxis;
 use hlod::runtime::SceneTree;
 use hlod::runtime::residency::{Residency, Sizes};
+use serde_json::Value;
 
 use crate::bench_support::{Place, city, hlod_bench};
 use crate::support::result::contents;
@@ -42,6 +43,24 @@ fn the_same_bytes_on_any_number_of_threads_and_from_any_folder() {
             assert!(results[0][file] == other[file], "{file} differs");
         }
     }
+}
+
+#[test]
+fn compressed_textures_take_less_and_are_recorded() {
+    let place = Place::new(city());
+    let run = ["out", "fly.csv", "-q", "--clock", "model", "--target-ms", "2000"];
+    for textures in ["auto", "rgba8", "bc7"] {
+        let options = ["--warm-up-frames", "600", "--textures", textures, "--out", textures];
+        place.bench(&[&run[..], &options].concat()).success();
+    }
+    let [auto, rgba8, bc7] = ["auto", "rgba8", "bc7"].map(|result| place.summary(result));
+    assert_eq!(auto, rgba8);
+    assert_eq!(rgba8["parameters"]["textures"], "rgba8");
+    assert_eq!(bc7["parameters"]["textures"], "bc7");
+    // Everything fits: the same is drawn. Half of what is held is texels.
+    assert_eq!(bc7["triangles_mean"], rgba8["triangles_mean"]);
+    let peak = |summary: &Value| summary["memory"]["peak_bytes"].as_f64().unwrap();
+    assert!(peak(&bc7) < peak(&rgba8) * 0.6, "{} of {}", peak(&bc7), peak(&rgba8));
 }
 
 fn replay(scene: &Scene, frames: usize, target_ms: f64) -> Vec<FrameRecord> {

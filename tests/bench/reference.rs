@@ -3,10 +3,15 @@
 use std::fs;
 
 use glam::DVec3;
+use hlod::bench::{ReferenceRenderer, Session};
 use hlod::camera::{View, read_path, write_path};
+use hlod::picture_error::mean_squared_error;
+use hlod::render::RenderOptions;
+use hlod::render::content::TextureFormat;
+use image::DynamicImage;
 use serde_json::Value;
 
-use crate::adapter::skip;
+use crate::adapter::{or_skip, skip};
 use crate::bench_support::{Place, city};
 use crate::damage::node_file;
 
@@ -150,6 +155,28 @@ fn leaves_look_as_the_reference(place: &Place) {
         let sum: f64 = frames.column(column).iter().filter(|pixels| !pixels.is_nan()).sum();
         assert_eq!(sum, 0.0, "{column}");
     }
+}
+
+#[test]
+fn compressed_leaves_look_the_same_in_less_memory() {
+    let session = Session::open(city()).unwrap();
+    let options = RenderOptions { size: [320, 180], ..RenderOptions::default() };
+    let tree = session.tree();
+    let leaves: Vec<u32> =
+        (0..tree.len() as u32).filter(|&node| tree.children(node).is_empty()).collect();
+    let place = Place::new(city());
+    let path = read_path(&place.path().join("orbit.csv"), session.scene().up).unwrap();
+    let shot = |format| {
+        let made = ReferenceRenderer::with_textures(&session, &options, 1 << 30, format);
+        let mut renderer = or_skip(made)?;
+        let image = renderer.render(&leaves, &path.frames[0].pose).unwrap();
+        Some((DynamicImage::from(image).into_rgb8(), renderer.used_bytes() as f64))
+    };
+    let Some((expected, bytes)) = shot(TextureFormat::Rgba8) else { return };
+    let Some((found, compressed_bytes)) = shot(TextureFormat::Bc7) else { return };
+    assert!(compressed_bytes < bytes * 0.6, "{compressed_bytes} of {bytes}");
+    let error = mean_squared_error(&expected, &found).unwrap();
+    assert!(error > 0.0 && error < 255.0f64.powi(2) / 10f64.powf(4.2), "{error}");
 }
 
 #[test]

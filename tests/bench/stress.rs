@@ -52,8 +52,13 @@ impl Rig {
     /// Roots loaded, the thread started. The cap is what the roots need and `nodes` nodes of the
     /// largest more; `None` is all the memory there is.
     pub fn new(session: &Session, nodes: Option<u64>, options: ResidencyOptions) -> Self {
-        let sizes =
-            Sizes::new(session.scene(), held_bytes, |[width, height]| picture_bytes(width, height));
+        let files = session.files();
+        let format = files.texture_format();
+        let sizes = Sizes::new(
+            session.scene(),
+            |vertices, triangles, own| held_bytes(vertices, triangles, own, format),
+            |size| picture_bytes(size, format),
+        );
         let pictures = |textures: &[u32]| -> u64 {
             let size = |&texture: &u32| {
                 sizes.textures[texture as usize].held_bytes
@@ -75,7 +80,6 @@ impl Rig {
         let options = ResidencyOptions { max_memory_bytes: cap, ..options };
         let residency = Residency::new(session.tree(), sizes.clone(), options).unwrap();
         let residency = Arc::new(Mutex::new(residency));
-        let files = session.files();
         let (mut arrived, mut errors) = (BTreeMap::new(), Vec::new());
         for &root in session.tree().roots() {
             let mut residency = residency.lock().unwrap();

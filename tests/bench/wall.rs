@@ -97,6 +97,26 @@ fn frames_to_settle_are_not_logged_and_load_what_the_first_frame_needs() {
 }
 
 #[test]
+fn runs_draw_with_the_textures_that_were_asked_for() {
+    let place = Place::new(city());
+    let Some(done) = wall(&place, "orbit.csv", &["--textures", "auto", "--out", "auto"]) else {
+        return;
+    };
+    done.success();
+    let auto = place.summary("auto");
+    let suits = if auto["adapter"]["is_processor"] == true { "rgba8" } else { "bc7" };
+    assert_eq!(auto["parameters"]["textures"], suits);
+    let asked =
+        place.bench(&[&["out", "orbit.csv", "-q"], &RUN[..], &["--textures", "bc7"]].concat());
+    if asked.get_output().status.code() == Some(NO_ADAPTER) {
+        asked.stderr(contains("cannot sample BC7"));
+        return;
+    }
+    asked.success();
+    assert_eq!(place.summary("bench")["parameters"]["textures"], "bc7");
+}
+
+#[test]
 fn levels_are_tinted_where_asked_for() {
     let place = Place::new(city());
     let options = ["--snapshots", "30", "--shading", "unlit"];

@@ -7,9 +7,10 @@ use image::{GrayImage, Luma, Rgb, RgbImage, RgbaImage};
 
 use super::accuracy::{Accuracy, FrameInspector, FrameSample, ReferenceContext, WorstFrame};
 use super::session::Session;
-use crate::camera::View;
+use crate::camera::{Pose, View};
 use crate::picture_error::{Gaps, PIXELS_PER_DEGREE, flip, mean_squared_error, ssim};
 use crate::render::RenderOptions;
+use crate::render::content::TextureFormat;
 use crate::runtime::{SceneTree, front_before};
 use crate::{Error, Result};
 pub use renderer::ReferenceRenderer;
@@ -26,6 +27,8 @@ const QUALITY: u8 = 85;
 /// Compares every so many frames of a run with the same view of the leaves.
 pub struct Reference {
     renderer: ReferenceRenderer,
+    /// Draws fronts of a run whose textures are stored in another way than the reference's.
+    fronts: Option<ReferenceRenderer>,
     leaves: Vec<u32>,
     every: u64,
     every_toggle: bool,
@@ -48,12 +51,30 @@ impl Reference {
         let renderer = ReferenceRenderer::new(session, options, CAP_BYTES)?;
         Ok(Self {
             renderer,
+            fronts: None,
             leaves,
             every: every.max(1),
             every_toggle: false,
             tolerance,
             worst: Vec::new(),
         })
+    }
+
+    /// Draws fronts that the run itself does not draw with their textures in the run's format. Leaves
+    /// stay RGBA8, so that what compression loses counts as error.
+    pub fn with_textures(
+        self,
+        session: &Session,
+        options: &RenderOptions,
+        format: TextureFormat,
+    ) -> Result<Self> {
+        let make = || ReferenceRenderer::with_textures(session, options, CAP_BYTES, format);
+        let fronts = (format != TextureFormat::Rgba8).then(make).transpose()?;
+        Ok(Self { fronts, ..self })
+    }
+
+    fn render_front(&mut self, front: &[u32], pose: &Pose) -> Result<RgbaImage> {
+        self.fronts.as_mut().unwrap_or(&mut self.renderer).render(front, pose)
     }
 
     /// Inspects every frame in which levels toggled as well.
@@ -106,7 +127,7 @@ impl FrameInspector for Reference {
         let pose = &view.pose;
         let drawn = match drawn {
             Some(drawn) => drawn,
-            None => self.renderer.render(front, pose)?,
+            None => self.render_front(front, pose)?,
         };
         let leaves = seen(self.renderer.tree(), &self.leaves, view);
         let reference = self.renderer.render(&leaves, pose)?;
@@ -137,7 +158,7 @@ impl FrameInspector for Reference {
         };
         if let Some(before) = before {
             let before = front_before(self.renderer.tree(), before, front);
-            let before = opaque(&self.renderer.render(&before, pose)?);
+            let before = opaque(&self.render_front(&before, pose)?);
             let pop = flip(&before, picture, PIXELS_PER_DEGREE).ok_or_else(other_size)?;
             accuracy.pop_flip = Some(pop.mean());
         }

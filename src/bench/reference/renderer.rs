@@ -7,6 +7,7 @@ use image::RgbaImage;
 use crate::bench::node_cache::NodeCache;
 use crate::bench::session::Session;
 use crate::camera::Pose;
+use crate::render::content::TextureFormat;
 use crate::render::{AdapterLabel, RenderOptions, Renderer};
 use crate::runtime::SceneTree;
 use crate::{Error, Result};
@@ -26,8 +27,19 @@ pub struct ReferenceRenderer {
 impl ReferenceRenderer {
     /// One that holds at most `cap_bytes`, or the bytes of one node where that is more.
     pub fn new(session: &Session, options: &RenderOptions, cap_bytes: u64) -> Result<Self> {
+        Self::with_textures(session, options, cap_bytes, TextureFormat::Rgba8)
+    }
+
+    /// The same with textures in a format; fails where the adapter cannot sample it.
+    pub fn with_textures(
+        session: &Session,
+        options: &RenderOptions,
+        cap_bytes: u64,
+        format: TextureFormat,
+    ) -> Result<Self> {
         let renderer = Renderer::new(&RenderOptions { keep_depths: true, ..options.clone() })?;
-        let (tree, files) = (session.tree().clone(), session.files());
+        renderer.check_textures(format)?;
+        let (tree, files) = (session.tree().clone(), session.files().with_textures(format));
         Ok(Self {
             near: tree.near_plane(),
             cache: NodeCache::new(tree, files, renderer, cap_bytes),

@@ -283,28 +283,30 @@ fn run(job: Job) -> Result<(Run, Context)> {
         pixels: arguments.gap_tolerance,
         most_error_pixels: arguments.gap_error,
     };
-    let reference = |every| Reference::new(session, &render, every, tolerance);
+    let mut renderer = match arguments.clock {
+        Clock::Wall => Some(Renderer::new(&render)?),
+        Clock::Model => None,
+    };
+    let preferred = renderer.as_ref().map(Renderer::preferred_textures).unwrap_or_default();
+    let suitable = session.suitable_textures(options.residency.max_memory_bytes, preferred);
+    let textures = arguments.textures.format().unwrap_or(suitable);
+    let options = BenchOptions { textures, ..options };
+    let reference = |every| {
+        Reference::new(session, &render, every, tolerance)?
+            .with_textures(session, &render, textures)
+    };
     let mut reference = arguments.reference_every.map(reference).transpose()?;
     let inspector = reference.as_mut().map(|reference| reference as &mut dyn FrameInspector);
     let progress = |frame: &FrameRecord| bar.frame(frame);
-    let (run, mut context) = match arguments.clock {
-        Clock::Model => {
+    let (run, mut context) = match &mut renderer {
+        None => {
             let constants = constants.unwrap_or_default();
             session.run_model(path, options, constants, inspector, progress)?
         }
-        Clock::Wall => {
-            let mut renderer = Renderer::new(&render)?;
+        Some(renderer) => {
             let dir = arguments.out.join("snapshots");
             let snapshots = arguments.snapshots.map(|every| Snapshots { every, dir });
-            session.run_wall(
-                path,
-                options,
-                constants,
-                &mut renderer,
-                snapshots,
-                inspector,
-                progress,
-            )?
+            session.run_wall(path, options, constants, renderer, snapshots, inspector, progress)?
         }
     };
     context.reference = reference.map(Reference::context).transpose()?;

@@ -1,7 +1,8 @@
 //! Smaller versions of pictures: each texel is the mean of the area that it covers in the level
 //! above, in linear light, weighted by alpha, so that what is cut away lends no colour.
 
-use super::held::{level_bytes, level_sizes};
+use super::TextureFormat::Rgba8;
+use super::held::level_sizes;
 use crate::color;
 
 /// Linear RGB and alpha, 65535 is 1; not premultiplied.
@@ -9,12 +10,12 @@ type Texel = [u16; 4];
 
 /// Fills all levels from the first; `levels` has room for them.
 pub(super) fn fill(width: u32, height: u32, levels: &mut [u8]) {
-    let (first, mut rest) = levels.split_at_mut(level_bytes([width, height]) as usize);
+    let (first, mut rest) = levels.split_at_mut(Rgba8.level_bytes([width, height]) as usize);
     let opaque = first.as_chunks::<4>().0.iter().all(|texel| texel[3] == 255);
     let mut size = [width as usize, height as usize];
     let mut source = Source::Bytes(first.as_chunks().0);
     for half in level_sizes(width, height).skip(1) {
-        let (level, after) = rest.split_at_mut(level_bytes(half) as usize);
+        let (level, after) = rest.split_at_mut(Rgba8.level_bytes(half) as usize);
         rest = after;
         let half = half.map(|side| side as usize);
         let linear =
@@ -165,7 +166,7 @@ mod tests {
         let rgba = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let rgba = rgba.flat_map(|(x, y)| texel(x, y)).collect();
         let picture = Picture::new(width, height, rgba).unwrap();
-        assert_eq!(picture.bytes(), picture_bytes(width, height));
+        assert_eq!(picture.bytes(), picture_bytes([width, height], Rgba8));
         picture.levels().map(|(_, level)| level.as_chunks().0.to_vec()).collect()
     }
 

@@ -1,13 +1,16 @@
 //! What is held in memory of a node: its geometry as one vertex and one index buffer, and its
-//! pictures decoded, with all their smaller versions. None of it needs a graphics card.
+//! pictures decoded, with all their smaller versions, and compressed where that is asked for. None of it
+//! needs a graphics card.
 //!
 //! [`held_bytes`] and [`picture_bytes`] say beforehand, from the scene's figures alone, what
 //! [`Content::bytes`] and [`Picture::bytes`] will be.
 
+mod bc7;
 mod draw;
 mod held;
 mod mips;
 mod picture;
+mod texture_format;
 mod vertex;
 
 use std::path::Path;
@@ -17,6 +20,9 @@ use glam::DVec3;
 pub use draw::{Alpha, Draw, DrawPicture};
 pub use held::{VERTEX_BYTES, held_bytes, picture_bytes};
 pub use picture::Picture;
+#[cfg(feature = "render")]
+pub(crate) use texture_format::LONGEST_COMPRESSED;
+pub use texture_format::TextureFormat;
 pub use vertex::Vertex;
 
 use crate::format::{NodeImageData, NodeMesh, read_glb};
@@ -80,6 +86,12 @@ impl Content {
         let (vertices, indices, draws) =
             draw::assemble(&mesh.primitives, &places).map_err(|what| Error::input(file, what))?;
         Ok(Self { origin: DVec3::from(mesh.origin), vertices, indices, draws, pictures })
+    }
+
+    /// The same with its pictures in this format, as far as they [can be](TextureFormat::of_picture).
+    pub fn stored_as(self, format: TextureFormat) -> Self {
+        let pictures = self.pictures.into_iter().map(|picture| picture.stored_as(format));
+        Self { pictures: pictures.collect(), ..self }
     }
 
     /// Bytes that it takes in memory, here as on the graphics card: [`held_bytes`] of its

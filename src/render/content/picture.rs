@@ -10,8 +10,9 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::held::{level_bytes, level_sizes, picture_bytes};
-use super::mips;
+use super::TextureFormat::{self, Bc7, Rgba8};
+use super::held::{level_sizes, picture_bytes};
+use super::{bc7, mips};
 use crate::{Error, Result};
 
 /// Longest side of a picture, in texels.
@@ -25,6 +26,7 @@ const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
 pub struct Picture {
     width: u32,
     height: u32,
+    format: TextureFormat,
     /// All levels, from the largest to that of one texel, without gaps.
     levels: Vec<u8>,
 }
@@ -32,8 +34,9 @@ pub struct Picture {
 impl fmt::Debug for Picture {
     /// Without its texels, which are many.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { width, height, .. } = self;
-        f.debug_struct("Picture").field("width", width).field("height", height).finish()
+        let Self { width, height, format, .. } = self;
+        let mut picture = f.debug_struct("Picture");
+        picture.field("width", width).field("height", height).field("format", format).finish()
     }
 }
 
@@ -41,11 +44,11 @@ impl Picture {
     /// Makes the smaller versions of a picture: means in linear light, by how opaque texels are.
     /// `None` where there are not four bytes a texel, or no texels.
     pub fn new(width: u32, height: u32, mut rgba: Vec<u8>) -> Option<Self> {
-        let bytes = level_bytes([width, height]);
+        let bytes = Rgba8.level_bytes([width, height]);
         if bytes == 0 || rgba.len() as u64 != bytes {
             return None;
         }
-        rgba.resize(usize::try_from(picture_bytes(width, height)).ok()?, 0);
+        rgba.resize(usize::try_from(picture_bytes([width, height], Rgba8)).ok()?, 0);
         Some(Self::with_room(width, height, rgba))
     }
 
@@ -71,7 +74,20 @@ impl Picture {
     /// `levels` has room for all levels, and the first is there.
     fn with_room(width: u32, height: u32, mut levels: Vec<u8>) -> Self {
         mips::fill(width, height, &mut levels);
-        Self { width, height, levels }
+        Self { width, height, format: Rgba8, levels }
+    }
+
+    /// The same in another format, as far as it [can be](TextureFormat::of_picture). What is
+    /// compressed stays so.
+    pub fn stored_as(self, format: TextureFormat) -> Self {
+        let format = format.of_picture([self.width, self.height]);
+        if format != Bc7 || self.format == Bc7 {
+            return self;
+        }
+        let encode = |([width, _], texels): ([u32; 2], &[u8])| {
+            bc7::encode(width as usize, texels.as_chunks().0)
+        };
+        Self { format, levels: self.levels().flat_map(encode).collect(), ..self }
     }
 
     /// Width in texels.
@@ -84,16 +100,21 @@ impl Picture {
         self.height
     }
 
+    /// How its texels are stored.
+    pub fn format(&self) -> TextureFormat {
+        self.format
+    }
+
     /// Bytes of all levels: [`picture_bytes`] of its size.
     pub fn bytes(&self) -> u64 {
         self.levels.len() as u64
     }
 
-    /// Size and texels of each level, from the largest to that of one texel.
+    /// Size in texels and bytes of each level, from the largest to that of one texel.
     pub fn levels(&self) -> impl Iterator<Item = ([u32; 2], &[u8])> {
         let mut rest = &self.levels[..];
         level_sizes(self.width, self.height).map(move |size| {
-            let (level, after) = rest.split_at(level_bytes(size) as usize);
+            let (level, after) = rest.split_at(self.format.level_bytes(size) as usize);
             rest = after;
             (size, level)
         })
@@ -110,8 +131,8 @@ fn check_size(found: [u32; 2], expected: [u32; 2]) -> Result<(), String> {
 }
 
 /// Room for all levels.
-fn room([width, height]: [u32; 2]) -> Result<Vec<u8>, String> {
-    let bytes = usize::try_from(picture_bytes(width, height)).map_err(|error| error.to_string())?;
+fn room(size: [u32; 2]) -> Result<Vec<u8>, String> {
+    let bytes = usize::try_from(picture_bytes(size, Rgba8)).map_err(|error| error.to_string())?;
     Ok(vec![0; bytes])
 }
 
@@ -131,7 +152,7 @@ fn decode_jpeg(bytes: &[u8], size: [u32; 2]) -> Result<Vec<u8>, String> {
     let info = decoder.info().ok_or_else(|| refuse(&"no header"))?;
     check_size([info.width.into(), info.height.into()], size)?;
     let mut levels = room(size)?;
-    let first = &mut levels[..level_bytes(size) as usize];
+    let first = &mut levels[..Rgba8.level_bytes(size) as usize];
     if decoder.output_buffer_size() != Some(first.len()) {
         return Err(refuse(&"its colours are not RGB or grey"));
     }
@@ -149,7 +170,7 @@ fn decode_png(bytes: &[u8], size: [u32; 2]) -> Result<Vec<u8>, String> {
     let image = reader.decode().map_err(refuse)?;
     check_size([image.width(), image.height()], size)?;
     let mut levels = image.into_rgba8().into_raw();
-    let bytes = usize::try_from(picture_bytes(size[0], size[1])).map_err(|e| e.to_string())?;
+    let bytes = usize::try_from(picture_bytes(size, Rgba8)).map_err(|e| e.to_string())?;
     levels.resize(bytes, 0);
     Ok(levels)
 }

@@ -82,7 +82,11 @@ fn what_is_held_is_what_was_foretold() {
         let own = mesh.images.iter();
         let own = own.filter(|image| matches!(image.data, NodeImageData::Embedded { .. }));
         let own: Vec<_> = own.map(|image| [image.width, image.height]).collect();
-        held_bytes(vertices as u32, corners as u32 / 3, &own)
+        let held = |format| held_bytes(vertices as u32, corners as u32 / 3, &own, format);
+        // Of the pictures one has sides that are no multiples of four.
+        let compressed = content(mesh).stored_as(TextureFormat::Bc7);
+        assert_eq!(compressed.bytes(), held(TextureFormat::Bc7));
+        held(TextureFormat::Rgba8)
     };
     assert_eq!(content(&mesh).bytes(), held(&mesh));
     mesh.primitives.pop();
@@ -192,6 +196,23 @@ fn pictures_that_are_cut_short_or_damaged_are_refused_by_name() {
         }
     }
     refused(b"neither", [1, 1]);
+}
+
+#[test]
+fn compressed_pictures_have_the_levels_of_others_in_whole_blocks() {
+    let rgba = photograph(12, 20).to_rgba8();
+    let picture = Picture::new(12, 20, rgba.into_raw()).unwrap();
+    let compressed = picture.clone().stored_as(TextureFormat::Bc7);
+    assert_eq!(compressed.format(), TextureFormat::Bc7);
+    let sizes = |picture: &Picture| picture.levels().map(|(size, _)| size).collect::<Vec<_>>();
+    assert_eq!(sizes(&compressed), sizes(&picture));
+    let blocks: Vec<usize> = compressed.levels().map(|(_, level)| level.len() / 16).collect();
+    assert_eq!(blocks, [15, 6, 2, 1, 1]);
+    // Again changes nothing, and neither does what cannot be compressed.
+    assert_eq!(compressed.clone().stored_as(TextureFormat::Bc7), compressed);
+    assert_eq!(compressed.clone().stored_as(TextureFormat::Rgba8), compressed);
+    let odd = Picture::new(6, 4, vec![9; 96]).unwrap();
+    assert_eq!(odd.clone().stored_as(TextureFormat::Bc7), odd);
 }
 
 #[test]
