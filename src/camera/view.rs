@@ -24,6 +24,12 @@ impl View {
         Self { pose, velocity, size, frustum: Frustum::new(&pose, aspect) }
     }
 
+    /// Whether its camera is where numbers are: neither infinite nor NaN.
+    pub fn is_finite(&self) -> bool {
+        let Pose { position, rotation, fov_y_deg } = self.pose;
+        position.is_finite() && rotation.is_finite() && fov_y_deg.is_finite()
+    }
+
     /// Pixels that one metre takes at one metre's distance, in the middle of the picture.
     pub fn pixels_per_metre(&self) -> f64 {
         f64::from(self.size[1]) / (2.0 * libm::tan(self.pose.fov_y_deg.to_radians() / 2.0))

@@ -15,6 +15,10 @@ use crate::runtime::residency::{Changes, Counters, MemoryUse, Residency};
 use crate::runtime::{SceneTree, ToggleCounter};
 use crate::{Error, Result};
 
+/// No more seconds than this are said to have passed between frames: a machine that slept or stalled,
+/// or whose clock jumped, has seen nothing meanwhile that it should forget anything for.
+const LONGEST_STEP_S: f64 = 1.0;
+
 /// What policies see, apart from the view.
 struct Seen<'a> {
     tree: &'a SceneTree,
@@ -150,7 +154,15 @@ impl<'a> Engine<'a> {
     }
 
     /// Draws a frame. The next begins `interval_s` seconds after this one began, at the earliest.
+    /// A view that is not [finite](View::is_finite) is refused.
     pub fn frame(&mut self, view: &View, interval_s: f64) -> Result<FrameReport> {
+        if !view.is_finite() {
+            let Pose { position, rotation, fov_y_deg } = view.pose;
+            return Err(Error::Usage(format!(
+                "camera: expected finite numbers, found a position of {position}, a rotation of \
+                 {rotation} and an angle of view of {fov_y_deg}°"
+            )));
+        }
         self.before.clone_from(&self.selection.front);
         let mut report = FrameReport::default();
 
@@ -198,7 +210,9 @@ impl<'a> Engine<'a> {
         self.backend.end_frame(&self.residency, report.frame_ms, interval_s * 1e3)?;
         self.count(&mut report)?;
         self.frames += 1;
-        self.seen.dt_s = (report.frame_ms / 1e3).max(interval_s);
+        // What is no number says nothing.
+        let step_s = (report.frame_ms / 1e3).max(interval_s).max(0.0);
+        self.seen.dt_s = step_s.min(LONGEST_STEP_S);
         self.pose = Some(view.pose);
         Ok(report)
     }
@@ -246,6 +260,13 @@ impl<'a> Engine<'a> {
         self.load = drawn;
     }
 
+    /// Sets the memory cap, bytes: by the end of the next frame no more is in use. The least useful
+    /// nodes leave, from the finest upward, even where they were drawn: their ancestors are in their
+    /// place. A cap below what the roots need is refused, and the old one stays.
+    pub fn set_max_memory(&mut self, bytes: u64) -> Result<()> {
+        lock(&self.residency)?.set_max_memory(bytes)
+    }
+
     /// Nodes that the last frame drew.
     pub fn drawn(&self) -> &[u32] {
         &self.drawn
@@ -282,7 +303,7 @@ impl<'a> Engine<'a> {
         self.start_bytes
     }
 
-    /// The most bytes that were ever in use, also between frames.
+    /// The most bytes that were ever in use, also between frames, under whatever cap.
     pub fn peak_bytes(&self) -> Result<u64> {
         Ok(lock(&self.residency)?.peak_bytes())
     }

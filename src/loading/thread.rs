@@ -211,9 +211,13 @@ impl Loader {
         }
         let arrival = (self.decode)(&self.files, reading);
         let usable = arrival.is_ok();
+        let Some(mut residency) = self.lock() else { return false };
+        // Given up while it was decoded: nobody waits for it.
+        if !matches!(residency.state(step.node), NodeState::Loading { .. }) {
+            return true;
+        }
         // It is there before anybody is told that it is.
         let sent = self.sender.send(arrival).is_ok();
-        let Some(mut residency) = self.lock() else { return false };
         if usable {
             residency.loaded(step.node);
         } else {

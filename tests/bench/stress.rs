@@ -1,7 +1,7 @@
 //! The loading thread over a scene on disk, under priorities that jump about and caps of a few
 //! nodes. After every frame all that is promised is checked; a watchdog ends what hangs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -42,6 +42,8 @@ pub struct Rig {
     pub thread: LoadingThread,
     pub errors: Vec<String>,
     cap: u64,
+    /// The highest cap that there was.
+    most: u64,
     arrived: BTreeMap<u32, Arrival>,
     /// Bytes of what is drawn, by node and by shared picture.
     nodes: BTreeMap<u32, u64>,
@@ -104,6 +106,7 @@ impl Rig {
             thread,
             errors,
             cap,
+            most: cap,
             arrived,
             nodes: BTreeMap::new(),
             textures: BTreeMap::new(),
@@ -114,12 +117,17 @@ impl Rig {
     /// selection would visit: roots, and children of what is resident.
     pub fn frame(&mut self, mut priority: impl FnMut(u32) -> Option<f64>) {
         let changes = self.residency.lock().unwrap().begin_frame(1.0 / 30.0);
+        // A node that was dropped may already have been loaded again.
+        let mut dropped: BTreeSet<u32> = changes.dropped.iter().copied().collect();
+        dropped.retain(|node| self.arrived.remove(node).is_none());
         for arrival in self.thread.arrivals() {
             match arrival {
+                Ok(arrival) if dropped.remove(&arrival.node) => {}
                 Ok(arrival) => drop(self.arrived.insert(arrival.node, arrival)),
                 Err(error) => self.errors.push(error.to_string()),
             }
         }
+        assert!(dropped.is_empty(), "{dropped:?} never came");
         for node in &changes.left {
             assert!(self.nodes.remove(node).is_some(), "node {node} left and was not there");
         }
@@ -152,10 +160,24 @@ impl Rig {
         self.thread.wake();
     }
 
+    /// Another cap, of which the least is what the roots need; whether it was lowered.
+    pub fn set_cap(&mut self, cap: u64) -> bool {
+        let changed = self.residency.lock().unwrap().set_max_memory(cap);
+        let is_lower = changed.is_ok() && cap < self.cap;
+        if changed.is_ok() {
+            (self.cap, self.most) = (cap, self.most.max(cap));
+        }
+        is_lower
+    }
+
     /// What holds at any time.
     fn check(&self, residency: &Residency) {
         let used = residency.used_bytes();
-        assert!(used <= self.cap && residency.peak_bytes() <= self.cap, "{used} of {}", self.cap);
+        assert!(used <= self.cap && residency.peak_bytes() <= self.most, "{used} of {}", self.cap);
+        // What was given up is not kept.
+        for &node in self.arrived.keys() {
+            assert_eq!(residency.state(node), NodeState::Loaded, "node {node}");
+        }
         let held: u64 = self.nodes.values().chain(self.textures.values()).sum();
         let nodes = self.sizes.nodes.iter().zip(0..);
         let in_flight: u64 = nodes
@@ -256,6 +278,38 @@ fn promises_hold_under_random_priorities_and_tight_caps() {
     println!("{sum:?}");
     assert!(sum.loads > 100 && sum.read_bytes > 100_000, "{sum:?}");
     assert!(sum.evictions > 0 && sum.suspensions > 0 && sum.abandoned > 0, "{sum:?}");
+}
+
+/// Caps change at any time, while nodes are read and decoded.
+#[test]
+fn a_cap_that_changes_is_held_and_nothing_given_up_is_kept() {
+    let mut abandoned = 0;
+    for (scene, chunk_bytes) in [(city(), 1 << 20), (street(), 100), (city(), 4 << 10)] {
+        let session = Session::open(scene).unwrap();
+        abandoned += watched("changing caps", move || {
+            let options = ResidencyOptions { chunk_bytes, ..Default::default() };
+            let mut rig = Rig::new(&session, None, options);
+            let nodes = rig.sizes.nodes.iter().map(|size| size.held_bytes + size.file_bytes);
+            let textures = rig.sizes.textures.iter().map(|size| size.held_bytes + size.file_bytes);
+            let room = nodes.sum::<u64>() + textures.sum::<u64>();
+            rig.set_cap(room);
+            let mut random = Random::new(9, chunk_bytes);
+            let mut lowered = 0;
+            for frame in 0..600 {
+                rig.frame(|node| Some(1.0 / f64::from(node + 1)));
+                std::thread::sleep(Duration::from_micros(random.bits() % 600));
+                let part = random.unit();
+                let cap = if frame % 3 == 2 { room } else { (room as f64 * part) as u64 };
+                lowered += usize::from(rig.set_cap(cap));
+            }
+            assert!(lowered > 50, "{lowered}");
+            rig.set_cap(room);
+            rig.settle(|node| Some(1.0 / f64::from(node + 1)));
+            assert_eq!(rig.errors, Vec::<String>::new());
+            rig.residency.lock().unwrap().counters().abandoned
+        });
+    }
+    assert!(abandoned > 0);
 }
 
 #[test]

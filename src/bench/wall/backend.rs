@@ -1,6 +1,6 @@
 //! The real backend: a loading thread, a graphics adapter, and time as it passes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -69,11 +69,16 @@ impl<'a> GpuBackend<'a> {
         &self.broken
     }
 
-    /// Takes what the loading thread delivered; fails where it will deliver no more.
-    fn receive(&mut self) -> Result<()> {
+    /// Takes what the loading thread delivered, without what was given up since; fails where it
+    /// will deliver no more.
+    fn receive(&mut self, dropped: &[u32]) -> Result<()> {
         let alive = self.thread.as_ref().map_or(Ok(()), LoadingThread::check);
+        // A node that was given up may already have been loaded again: its first arrival is dropped.
+        let mut dropped: BTreeSet<u32> = dropped.iter().copied().collect();
+        dropped.retain(|node| self.arrived.remove(node).is_none());
         for arrival in self.thread.iter().flat_map(LoadingThread::arrivals) {
             match arrival {
+                Ok(arrival) if dropped.remove(&arrival.node) => {}
                 Ok(arrival) => {
                     self.arrived.insert(arrival.node, arrival);
                 }
@@ -124,7 +129,7 @@ impl Backend for GpuBackend<'_> {
 
     fn apply(&mut self, changes: &Changes) -> Result<f64> {
         self.frame_start = Instant::now();
-        self.receive()?;
+        self.receive(&changes.dropped)?;
         changes.left.iter().for_each(|&node| self.renderer.remove(node));
         changes.left_textures.iter().for_each(|&texture| self.renderer.remove_shared(texture));
         for &node in &changes.arrived {

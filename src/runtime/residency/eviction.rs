@@ -47,9 +47,10 @@ impl Residency {
 
     /// Bytes that a node and those before it lack even at the next frame.
     fn missing(&self, node: u32, reservations: &Reservations) -> u64 {
-        let leaving: u64 = self.leaving.iter().map(|&node| self.least_freed(node)).sum();
+        let leaving = self.leaving.iter().chain(&self.dropped);
+        let leaving: u64 = leaving.map(|&node| self.least_freed(node)).sum();
         let needed = reservations.bytes + self.needed_bytes(node);
-        needed.saturating_sub(self.budget.free() + leaving)
+        self.budget.beyond(needed).saturating_sub(leaving)
     }
 
     /// Frees `missing` bytes of what is less important than a node; false, and nothing done,
@@ -92,11 +93,7 @@ impl Residency {
         if missing > 0 {
             return false;
         }
-        for other in abandoned {
-            self.end_reading(other);
-            self.forget_load(other, NodeState::Absent);
-            self.counters.abandoned += 1;
-        }
+        abandoned.into_iter().for_each(|other| self.abandon(other));
         victims.into_iter().for_each(|other| self.leave(other));
         true
     }
@@ -114,7 +111,7 @@ impl Residency {
     }
 
     /// A node's memory is free from the next frame on.
-    fn leave(&mut self, node: u32) {
+    pub(super) fn leave(&mut self, node: u32) {
         self.nodes[node as usize].state = NodeState::Leaving;
         self.list.set_loaded(node, false);
         self.resident -= 1;

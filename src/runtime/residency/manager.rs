@@ -1,12 +1,13 @@
 //! What is loaded next, and what is evicted for it.
 
+use super::cap::too_low;
 use super::eviction::Reservations;
 use super::memory_budget::MemoryBudget;
 use super::recent_priority::RecentPriority;
 use super::state::{Counters, NodeRecord, NodeState, Residency};
 use super::{PriorityList, ResidencyOptions, Sizes};
+use crate::Result;
 use crate::runtime::SceneTree;
-use crate::{Error, Result};
 
 /// How many nodes are tried, in order of priority, before loading waits for memory.
 const CANDIDATES: usize = 16;
@@ -50,6 +51,9 @@ pub struct Changes {
     pub arrived_bytes: u64,
     /// Nodes whose memory is to be freed.
     pub left: Vec<u32>,
+    /// Nodes that were loaded and given up before drawing took them over: what was decoded of
+    /// them is to be freed.
+    pub dropped: Vec<u32>,
     /// Shared pictures whose memory is to be freed.
     pub left_textures: Vec<u32>,
 }
@@ -72,12 +76,13 @@ impl Residency {
     /// alone do not fit below the cap.
     pub fn new(tree: &SceneTree, sizes: Sizes, options: ResidencyOptions) -> Result<Self> {
         let nodes = tree.len();
-        let residency = Self {
+        let mut residency = Self {
             budget: MemoryBudget::new(options.max_memory_bytes, sizes.textures.len()),
             list: PriorityList::new(nodes),
             nodes: (0..nodes as u32).map(|node| record(tree, &sizes, node)).collect(),
             to_read: vec![0; nodes],
             textures_held: vec![false; sizes.textures.len()],
+            textures_drawn: vec![false; sizes.textures.len()],
             loaded_before: vec![false; nodes],
             frame: 0,
             now_s: 0.0,
@@ -88,6 +93,7 @@ impl Residency {
             ahead_bytes: 0.0,
             arrivals: Vec::new(),
             leaving: Vec::new(),
+            dropped: Vec::new(),
             orphans: Vec::new(),
             loading: Vec::new(),
             current: None,
@@ -95,18 +101,15 @@ impl Residency {
             requested_bytes: 0,
             cursor: 0,
             counters: Counters::default(),
+            roots: tree.roots().len(),
+            least_bytes: 0,
             options,
             sizes,
         };
-        let needed = residency.bytes_for_roots(tree);
-        if needed > options.max_memory_bytes {
-            return Err(Error::Usage(format!(
-                "--max-memory: expected at least {needed} bytes, which the {} roots take while \
-                 they are loaded, found {}; build with a lower --desired-tris or fewer blocks to \
-                 make roots smaller",
-                tree.roots().len(),
-                options.max_memory_bytes
-            )));
+        residency.least_bytes = residency.bytes_for_roots(tree);
+        if options.max_memory_bytes < residency.least_bytes {
+            let found = options.max_memory_bytes;
+            return Err(too_low(residency.roots, residency.least_bytes, found));
         }
         Ok(residency)
     }
@@ -320,12 +323,19 @@ impl Residency {
             self.forget(node, NodeState::Absent, &mut changes.left_textures);
             changes.left.push(node);
         }
+        for node in std::mem::take(&mut self.dropped) {
+            self.forget(node, NodeState::Absent, &mut changes.left_textures);
+            changes.dropped.push(node);
+        }
         for texture in std::mem::take(&mut self.orphans) {
             // Unless another load has come to need it since.
             let held = &mut self.textures_held[texture as usize];
+            let drawn = &mut self.textures_drawn[texture as usize];
             self.budget.release_texture(&self.sizes, texture, |texture| {
                 *held = false;
-                changes.left_textures.push(texture);
+                if std::mem::take(drawn) {
+                    changes.left_textures.push(texture);
+                }
             });
         }
         let mut bytes = 0;
@@ -340,7 +350,11 @@ impl Residency {
         changes.arrived = self.arrivals.drain(..taken).collect();
         for &node in &changes.arrived {
             self.nodes[node as usize].state = NodeState::Resident;
-            changes.arrived_bytes += self.sizes.nodes[node as usize].held_bytes;
+            let size = &self.sizes.nodes[node as usize];
+            changes.arrived_bytes += size.held_bytes;
+            for &texture in &size.textures {
+                self.textures_drawn[texture as usize] = true;
+            }
         }
         self.resident += taken;
         changes

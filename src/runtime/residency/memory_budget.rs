@@ -25,8 +25,23 @@ impl MemoryBudget {
         self.peak
     }
 
+    /// None while a cap that was lowered is exceeded.
     pub fn free(&self) -> u64 {
-        self.cap - self.used
+        self.cap.saturating_sub(self.used)
+    }
+
+    /// Bytes beyond the cap, were so many more in use.
+    pub fn beyond(&self, more_bytes: u64) -> u64 {
+        (self.used + more_bytes).saturating_sub(self.cap)
+    }
+
+    /// Whether more is in use than may be, since the cap was lowered.
+    pub fn is_over(&self) -> bool {
+        self.used > self.cap
+    }
+
+    pub fn set_cap(&mut self, cap: u64) {
+        self.cap = cap;
     }
 
     /// Bytes that holding a node takes beyond what is held already.

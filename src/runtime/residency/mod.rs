@@ -2,6 +2,7 @@
 //! and a cap that is never exceeded. No files and no threads: whoever loads asks what to read and
 //! tells what was read.
 
+mod cap;
 mod eviction;
 mod list;
 mod manager;

@@ -18,7 +18,7 @@ pub enum NodeState {
     Loaded,
     /// Ready to be drawn.
     Resident,
-    /// Given up; its memory is free once drawing lets go of it.
+    /// Given up; its memory is free once drawing lets go of it, or of what was decoded of it.
     Leaving,
     /// Its files cannot be used.
     Broken,
@@ -48,7 +48,7 @@ pub struct Counters {
     pub evictions: u64,
     /// Loads that were suspended for a more important one.
     pub suspensions: u64,
-    /// Loads that were given up half way.
+    /// Loads that were given up half way, or before drawing took them over.
     pub abandoned: u64,
 }
 
@@ -88,6 +88,8 @@ pub struct Residency {
     pub(super) to_read: Vec<u64>,
     /// By shared picture: whether it is in memory.
     pub(super) textures_held: Vec<bool>,
+    /// By shared picture: whether drawing holds it.
+    pub(super) textures_drawn: Vec<bool>,
     /// By node: whether it was ever loaded.
     pub(super) loaded_before: Vec<bool>,
     pub(super) frame: u32,
@@ -105,8 +107,10 @@ pub struct Residency {
     pub(super) ahead_bytes: f64,
     /// Loaded, in the order in which they were.
     pub(super) arrivals: Vec<u32>,
-    /// Leaving.
+    /// Leaving, and held by drawing.
     pub(super) leaving: Vec<u32>,
+    /// Leaving, and not taken over by drawing.
+    pub(super) dropped: Vec<u32>,
     /// Shared pictures in memory that only a load needed that was given up; drawing lets go of
     /// them, and their memory is free, at the next frame.
     pub(super) orphans: Vec<u32>,
@@ -120,6 +124,10 @@ pub struct Residency {
     /// Where [`Residency::stale`] goes on.
     pub(super) cursor: usize,
     pub(super) counters: Counters,
+    /// How many roots there are.
+    pub(super) roots: usize,
+    /// The least cap that there may be, bytes.
+    pub(super) least_bytes: u64,
 }
 
 impl Residency {
@@ -144,7 +152,7 @@ impl Residency {
         self.budget.used()
     }
 
-    /// The most bytes that were ever in use.
+    /// The most bytes that were ever in use, under whatever cap.
     pub fn peak_bytes(&self) -> u64 {
         self.budget.peak()
     }
@@ -208,9 +216,10 @@ impl Residency {
 
     /// Gives back what a node held.
     pub(super) fn forget(&mut self, node: u32, state: NodeState, gone: &mut Vec<u32>) {
-        let held = &mut self.textures_held;
+        let (held, drawn) = (&mut self.textures_held, &mut self.textures_drawn);
         self.budget.release(&self.sizes, node, |texture| {
-            if std::mem::take(&mut held[texture as usize]) {
+            held[texture as usize] = false;
+            if std::mem::take(&mut drawn[texture as usize]) {
                 gone.push(texture);
             }
         });
