@@ -240,11 +240,14 @@ impl CostModel {
         // After a pause there is nothing newer than what is known.
         let dt_s = if dt_s.is_nan() { LONGEST_S } else { dt_s.clamp(0.0, LONGEST_S) };
         let kept = libm::exp2(-dt_s / HALF_LIFE_S);
-        let error = self.estimate(load).mean_ms / actual_ms - 1.0;
+        let expected_ms = self.estimate(load).mean_ms;
+        let error = expected_ms / actual_ms - 1.0;
         let [frames, sum, squares] = self.errors.map(|sum| sum * kept);
         self.errors = [frames + 1.0, sum + error, squares + error * error];
-        // Relative errors count: a frame of 100 ms must not outweigh a hundred of 10.
-        let weight = 1.0 / (actual_ms * actual_ms);
+        // Relative errors count: a frame of 100 ms must not outweigh a hundred of 10, nor one that
+        // a clock says took no time all others.
+        let relative_to = actual_ms.max(expected_ms / MOST_DRIFT);
+        let weight = 1.0 / (relative_to * relative_to);
         self.learn(terms, actual_ms, gpu_ms, weight, kept);
         let unexplained = actual_ms / dot(&self.sums(), &terms).max(LEAST_MS);
         let unexplained = unexplained.clamp(self.drift / MOST_DRIFT, self.drift * MOST_DRIFT);
@@ -313,6 +316,20 @@ mod tests {
             hidden_fragments: 3e6 * random.unit(),
             uploaded_bytes: if random.unit() < 0.2 { 3e6 * random.unit() } else { 0.0 },
         }
+    }
+
+    #[test]
+    fn a_frame_that_a_clock_says_took_no_time_says_little_of_the_next() {
+        let mut model = CostModel::new(&PRICES);
+        let mut random = Random::new(3, 0);
+        for _ in 0..300 {
+            let load = load(&mut random);
+            model.observe(&load, exact(&PRICES, &load), None, 1.0 / 30.0);
+        }
+        let load = load(&mut random);
+        model.observe(&load, 1e-3, None, 1.0 / 30.0);
+        let priced = model.priced_ms(&load) / exact(&PRICES, &load);
+        assert!(priced > 0.85, "{priced}");
     }
 
     fn zero() -> Prices {

@@ -25,6 +25,12 @@ const STALL: f64 = 1.6;
 /// unless they are a larger part of all than this: then the machine has become slower.
 const STALLS: f64 = 0.05;
 
+/// So many stalls in a row were a slow machine,
+const RUN: usize = 3;
+
+/// which is fast again, and the run forgotten, once as many frames in a row are no stalls any more.
+const AFTER_RUN: usize = 10;
+
 /// However wrong estimates were, budgets stay within this of the target.
 const RANGE: [f64; 2] = [0.5, 2.0];
 
@@ -73,6 +79,18 @@ impl Margin {
         let is_old = |at: &(f64, f64)| at.0 < self.now_s - WINDOW_S;
         while self.ratios.len() > MOST_FRAMES || self.ratios.front().is_some_and(is_old) {
             self.ratios.pop_front();
+        }
+        self.forget_run();
+    }
+
+    /// Forgets a run of stalls that is over. What stalls now and then is remembered.
+    fn forget_run(&mut self) {
+        let Some(end) = self.ratios.len().checked_sub(AFTER_RUN) else { return };
+        let after = self.ratios.iter().skip(end).map(|&(_, ratio)| ratio).fold(0.0, f64::max);
+        let before = self.ratios.iter().take(end).rev();
+        let run = before.take_while(|&&(_, ratio)| ratio > STALL * after).count();
+        if run >= RUN {
+            self.ratios.drain(end - run..end);
         }
     }
 }
@@ -127,9 +145,21 @@ mod tests {
         observe(1.0, 600);
         assert_eq!(observe(100.0, 30), 1.0, "stalls");
         assert_eq!(observe(100.0, 5), 2.0, "too many, but budgets are never less than half");
-        assert_eq!(observe(1.0, 601), 1.0, "forgotten");
+        assert_eq!(observe(1.0, AFTER_RUN - 1), 2.0, "it may stall again");
+        assert_eq!(observe(1.0, 1), 1.0, "fast again");
         assert_eq!(observe(1.25, 40), 1.25 / LATE, "so that these are just not late");
         assert_eq!(observe(1.25, 80), 1.25);
+    }
+
+    #[test]
+    fn what_stalls_again_and_again_is_remembered() {
+        let mut margin = Margin::default();
+        for _ in 0..10 {
+            [1.0; 18].iter().for_each(|ratio| margin.observe(10.0, 10.0 * ratio, FRAME_S));
+            [2.0; 2].iter().for_each(|ratio| margin.observe(10.0, 10.0 * ratio, FRAME_S));
+        }
+        (0..30).for_each(|_| margin.observe(10.0, 10.0, FRAME_S));
+        assert_eq!(margin.ratio(), 2.0 / LATE);
     }
 
     #[test]

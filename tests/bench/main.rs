@@ -15,6 +15,7 @@ mod bench_support;
 
 mod cli;
 mod damage;
+mod faults;
 mod golden;
 #[cfg(feature = "render")]
 mod mixtures;

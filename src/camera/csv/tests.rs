@@ -100,6 +100,27 @@ fn a_bad_row_is_named_with_line_and_column_and_what_was_expected() {
 }
 
 #[test]
+fn what_is_no_finite_number_is_refused_in_every_column_of_every_form() {
+    for (header, row) in [
+        (HEADER, "0,0,1,2,3,0,0,0,1,60"),
+        ("frame,time_s,x,y,z,yaw_deg,pitch_deg,roll_deg", "0,0,1,2,3,30,-10,5"),
+        ("frame,time_s,x,y,z,tx,ty,tz", "0,0,1,2,3,9,8,7"),
+    ] {
+        let names: Vec<_> = header.split(',').collect();
+        for (column, name) in names.iter().enumerate() {
+            for bad in ["NaN", "-nan", "inf", "-inf", "infinity", "1e309"] {
+                let mut fields: Vec<_> = row.split(',').collect();
+                fields[column] = bad;
+                let text = format!("{header}\n{row}\n{}\n", fields.join(","));
+                let error = parse(text).unwrap_err().to_string();
+                let place = format!("route.csv: line 3: column {} ({name}): ", column + 1);
+                assert!(error.starts_with(&place) && error.contains(bad), "{error}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_bad_header_is_named_with_what_was_expected() {
     for (header, expected) in [
         ("", "found nothing"),

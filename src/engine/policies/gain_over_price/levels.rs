@@ -7,6 +7,16 @@ use crate::engine::FrameInput;
 /// A node that is brought back to the level that it had within so many seconds rests longer each time.
 const BACK_WITHIN_S: f64 = 15.0;
 
+/// Unless the budget is less than this part of what it was of late: the machine has become slower, and
+/// no node is to blame,
+const SLOW: f64 = 0.7;
+
+/// nor for as many seconds after, in which what gave way returns all at once.
+const AFTER_SLOW_S: f64 = 1.0;
+
+/// What the budget was of late is half forgotten after so many seconds.
+const OF_LATE_S: f64 = 15.0;
+
 /// By how much longer.
 const LONGER: f64 = 16.0;
 
@@ -46,6 +56,10 @@ pub(super) struct Levels {
     dwell_s: f64,
     /// In the frame at hand.
     have_changed: bool,
+    /// The highest budget of late, milliseconds.
+    highest_ms: f64,
+    /// When the budget was much less than that last.
+    slow_s: Option<f64>,
     pose: Option<Pose>,
     /// When the camera moved last.
     moved_s: f64,
@@ -60,6 +74,11 @@ impl Levels {
             self.moved_s = self.now_s;
         }
         self.have_changed = false;
+        let kept = libm::exp2(-frame.dt_s / OF_LATE_S);
+        self.highest_ms = (self.highest_ms * kept).max(frame.budget_ms);
+        if frame.budget_ms < SLOW * self.highest_ms {
+            self.slow_s = Some(self.now_s);
+        }
         self.dwell_s = options.dwell_s;
     }
 
@@ -94,7 +113,8 @@ impl Levels {
         self.have_changed = true;
         let was_still = self.is_still();
         let level = &mut self.nodes[node as usize];
-        let is_back = self.now_s - level.changed_s < BACK_WITHIN_S;
+        let is_to_blame = self.slow_s.is_none_or(|slow_s| self.now_s - slow_s > AFTER_SLOW_S);
+        let is_back = is_to_blame && self.now_s - level.changed_s < BACK_WITHIN_S;
         level.rest_s = match is_back {
             true => (level.rest_s * LONGER).clamp(options.backoff_s, LONGEST_S),
             false => options.dwell_s,

@@ -44,6 +44,19 @@ fn a_frame_that_would_be_late_is_relieved_at_once_and_detail_returns_later() {
     assert!((15..=16).contains(&returned), "{returned} frames of 1/30 s");
 }
 
+#[test]
+fn what_gave_way_to_a_machine_that_became_slower_returns_once_it_is_fast_again() {
+    let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), root(11.0, 0.1, 2)]));
+    let mut policy = policy(&[]);
+    frame.target_ms = 40.0;
+    // Refined only just now: it would rest for long, had it given way for its own price.
+    assert_eq!((0..30).map(|_| frame.front(&mut *policy)).last().unwrap(), [1, 2, 4, 5]);
+    frame.target_ms = 20.0;
+    assert_eq!((0..60).map(|_| frame.front(&mut *policy)).last().unwrap(), [0, 3]);
+    frame.target_ms = 40.0;
+    assert_eq!(frame.front(&mut *policy), [1, 2, 4, 5]);
+}
+
 /// Whether the farther of two is refined rather than the nearer, once the camera went so many metres
 /// towards both. From where it begins both rank alike; from further on, the nearer ranks higher.
 fn is_farther(metres: &[f64], settings: &[(&str, f64)]) -> Vec<bool> {
