@@ -70,7 +70,8 @@ impl Session {
         if all > max_memory_bytes { preferred } else { TextureFormat::Rgba8 }
     }
 
-    fn sizes(&self, format: TextureFormat) -> Sizes {
+    /// What nodes take in memory with their textures in a format.
+    pub fn sizes(&self, format: TextureFormat) -> Sizes {
         Sizes::new(
             &self.scene,
             |vertices, triangles, own| held_bytes(vertices, triangles, own, format),

@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 
 use hlod::bench::Session;
 use hlod::loading::{Arrival, LoadingThread};
-use hlod::render::content::{held_bytes, picture_bytes};
 use hlod::runtime::SceneTree;
 use hlod::runtime::residency::{Counters, NodeState, Residency, ResidencyOptions, Sizes};
 
@@ -55,12 +54,7 @@ impl Rig {
     /// largest more; `None` is all the memory there is.
     pub fn new(session: &Session, nodes: Option<u64>, options: ResidencyOptions) -> Self {
         let files = session.files();
-        let format = files.texture_format();
-        let sizes = Sizes::new(
-            session.scene(),
-            |vertices, triangles, own| held_bytes(vertices, triangles, own, format),
-            |size| picture_bytes(size, format),
-        );
+        let sizes = session.sizes(files.texture_format());
         let pictures = |textures: &[u32]| -> u64 {
             let size = |&texture: &u32| {
                 sizes.textures[texture as usize].held_bytes

@@ -9,8 +9,18 @@ use super::surface::Surface;
 use crate::format::NodeMesh;
 use crate::mesh::UpAxis;
 
-/// Slabs of a node, at most: the largest.
+/// Slabs of a node, at most: the largest,
 const MOST_SLABS: usize = 64;
+
+/// and no more than one for so many triangles, so that small nodes hold little beside themselves,
+const TRIANGLES: usize = 8;
+
+/// but as many as these.
+const LEAST_SLABS: usize = 4;
+
+fn most_slabs(triangles: usize) -> usize {
+    (triangles / TRIANGLES).clamp(LEAST_SLABS, MOST_SLABS)
+}
 
 /// A node as what hides others, and as what may be hidden.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,16 +37,18 @@ impl NodeOcclusion {
     /// Of what is drawn of a node, in a scene whose up axis is `up`.
     pub fn new(mesh: &NodeMesh, up: UpAxis) -> Self {
         let mut slabs = find_slabs(&Surface::new(mesh), up.from_z_up(DVec3::Z));
+        let corners = mesh.primitives.iter().map(|primitive| primitive.indices.len());
         slabs.sort_by(|a, b| b.area().total_cmp(&a.area()));
-        slabs.truncate(MOST_SLABS);
+        slabs.truncate(most_slabs(corners.sum::<usize>() / 3));
         slabs.shrink_to_fit();
         Self { origin: mesh.origin.into(), slabs, pieces: Pieces::new(mesh) }
     }
 
     /// Most bytes that it takes in memory, for a node of so many triangles.
     pub fn most_bytes(triangles: u32) -> u64 {
-        let slabs = MOST_SLABS * size_of::<Slab>() + size_of::<Self>();
-        slabs as u64 + Pieces::most_bytes(triangles as usize)
+        let triangles = triangles as usize;
+        let slabs = most_slabs(triangles) * size_of::<Slab>() + size_of::<Self>();
+        slabs as u64 + Pieces::most_bytes(triangles)
     }
 
     /// Whether all of it is in boxes of which `is_out` says that nothing in them is seen; not where there

@@ -12,7 +12,7 @@ use hlod::engine::{
 };
 use hlod::format::Scene;
 use hlod::mesh::UpAxis;
-use hlod::render::content::{held_bytes, picture_bytes};
+use hlod::render::content::TextureFormat;
 use hlod::runtime::SceneTree;
 use hlod::runtime::residency::{Changes, Residency, ResidencyOptions, Sizes};
 use hlod::{Error, Result};
@@ -126,7 +126,7 @@ impl Ground {
         Self {
             name: "city",
             tree: session.tree().clone(),
-            sizes: Sizes::new(session.scene(), held_bytes, |[w, h]| picture_bytes(w, h)),
+            sizes: session.sizes(TextureFormat::Rgba8),
             target_ms: 20.0,
             wall,
             upload_bytes_per_s: ResidencyOptions::DEFAULT.upload_bytes_per_s,
