@@ -26,6 +26,7 @@ fn jumps() -> Vec<(&'static str, Fault)> {
         ("at no time", interval(f64::NAN)),
         ("took an hour", said(3.6e6)),
         ("took no time", said(0.0)),
+        ("took a microsecond", said(1e-3)),
         ("took less than none", said(-5.0)),
         ("took for ever", said(f64::INFINITY)),
         ("took no number", said(f64::NAN)),
