@@ -2,80 +2,151 @@
 
 import csv
 import json
-import statistics
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
 
-from common import DOCS, Options, Programs, machine, real_data, run, say, table, write_between_markers
+import policies_summary
+from common import DOCS, ROOT, Options, Programs, machine, real_data, run, say, write_between_markers
+from policies_tables import (
+    PATHS,
+    POPPED,
+    TARGETS,
+    TOLD,
+    by_path,
+    causes,
+    everything,
+    pairs,
+    pareto,
+    pops,
+)
 
 REAL = ["oblique_a", "sceaux", "hamada", "ingolstadt"]
-PATHS = ["walk", "fly", "rise", "turn"]
-TARGETS = [15, 30, 60]
-# The target of which all figures are told.
-TOLD = 30
-# The paths along which every toggle is drawn.
-POPPED = ["walk", "rise"]
-COLUMNS = [
-    ("flip_mean", "FLIP", 4),
-    ("flip_p95", "p95", 4),
-    ("flip_to_oracle", "to oracle", 4),
-    ("frame_ms_p95", "frame p95, ms", 1),
-    ("late_percent", "late, %", 1),
-    ("longest_late_s", "longest late, s", 1),
-    ("used_percent", "used, %", 0),
-    ("toggles_per_min", "toggles/min", 0),
-    ("read_mb", "read, MB", 1),
-    ("peak_mb", "peak, MB", 1),
-    ("estimate_mean_percent", "estimate, %", 1),
-    ("estimate_sd_percent", "±", 1),
-]
-CAUSES = [
-    ("chosen_per_min", "chosen"),
-    ("arrived_per_min", "arrived"),
-    ("evicted_per_min", "evicted"),
-    ("came_into_view_per_min", "came into view"),
-]
+# Along these no constant was chosen.
+ASIDE = ["oblique_b", "lyon_roads", "wageningen", "3dfier", "torcs_street1"]
+# What a node takes on a card: bytes of a vertex, a triangle and a texel with its smaller versions.
+HELD = [24, 6, 16 / 3]
+# Milliseconds in which a fast card does not draw all there is.
+FAST_TARGET = 1
 
 
 def main():
     arguments = parse()
-    programs = Programs(features=True)
-    scenes = [("city", [programs.city("city-policies", **city_options(arguments))])]
+    programs = Programs(features=True, examples=["selection_time"])
+    city = programs.city("city-policies", **city_options(arguments))
+    scenes = built(programs, [("city", [city])])
+    aside = []
     if not arguments.quick:
-        scenes += [(name, models) for name in REAL if (models := real_data(name))]
-    folders = []
-    for name, models in scenes:
+        scenes += built(programs, [(name, real_data(name)) for name in REAL])
+        aside = built(programs, [(name, real_data(name)) for name in ASIDE])
+    figures = measure(arguments, programs, scenes, aside)
+    rows = figures["everywhere"]
+    parts = [machine(), conditions(arguments), everything(rows), pareto(rows)]
+    parts += [pairs(figures["means"]), pops(figures["pops"])]
+    parts += [f"`{name}`, target {TOLD} ms:\n\n{by_path(rows, name)}" for name, _ in scenes]
+    parts += [f"`{name}`, kept aside:\n\n{by_path(figures['aside'], name)}" for name, _ in aside]
+    parts.append("Toggles a minute by their causes:\n\n" + causes(rows))
+    text = joined(parts)
+    summary = joined([policies_summary.table_of(figures), machine()])
+    print(text, summary, sep="\n")
+    if arguments.write:
+        write_between_markers(DOCS / "policies.md", "policies", text)
+        write_between_markers(ROOT / "README.md", "policies", summary)
+        policies_summary.plot(rows, TARGETS, DOCS / "policies.svg")
+
+
+def joined(parts):
+    return "\n\n".join(part.strip("\n") for part in parts) + "\n"
+
+
+def built(programs, inputs):
+    """Name and folder of each scene that there is data for."""
+    scenes = []
+    for name, models in inputs:
+        if not models:
+            continue
         out = programs.work / "policies" / name
         out.parent.mkdir(exist_ok=True)
         run([programs.path("hlod-build"), "--quiet", *map(str, models), str(out)])
-        folders.append(str(out))
-    say("all policies")
-    common = ["--frames", str(arguments.frames)]
-    common += ["--reference-every", str(max(1, arguments.frames // 3))]
-    everywhere = ["--paths", ",".join(PATHS), "--targets", ",".join(map(str, TARGETS))]
-    everywhere += ["--seeds", str(arguments.seeds)]
-    rows, figures = replay(programs, folders, "policies-results", common + everywhere)
-    say("every toggle")
-    popped = ["--paths", ",".join(POPPED), "--targets", str(TOLD), "--seeds", "1", "--pops"]
-    toggled, _ = replay(programs, folders, "policies-pops", common + popped)
-    names = [name for name, _ in scenes]
-    parts = [machine(), conditions(arguments), everything(rows), pareto(rows), pairs(figures)]
-    parts.append(pops(toggled))
-    parts += [f"`{name}`, target {TOLD} ms:\n\n{by_path(rows, name)}" for name in names]
-    parts.append("Toggles a minute by their causes:\n\n" + causes(rows))
-    text = "\n\n".join(part.strip("\n") for part in parts) + "\n"
-    print(text)
-    if arguments.write:
-        write_between_markers(DOCS / "policies.md", "policies", text)
+        scenes.append((name, str(out)))
+    return scenes
 
 
-def replay(programs, folders, name, options):
-    """All runs, and their means with intervals."""
-    results = programs.work / name
-    program = [programs.path("hlod-bench"), "policies", *folders, "--quiet"]
-    run([*program, "--out", str(results), *options])
-    with open(results / "policies.csv", newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    with open(results / "policies.json", encoding="utf-8") as file:
-        return rows, json.load(file)
+def measure(arguments, programs, scenes, aside):
+    """All runs: rows of policies.csv by what they are for, and the means over those of `everywhere`.
+
+    Two comparisons run side by side: by the model clock, how long they take changes nothing.
+    """
+    seeds = ["--seeds", str(arguments.seeds)]
+    folders = [folder for _, folder in scenes]
+    pictures = ["--reference-every", str(max(1, arguments.frames // 3)), *seeds]
+    none = ["--reference-every", "0", *seeds]
+    popped = ["--reference-every", str(arguments.frames), "--seeds", "1", "--pops"]
+    card = ["--constants", str(ROOT / "scripts" / "figures" / "fast-card.json")]
+
+    def replay(what, folders, paths, targets, *options):
+        results = programs.work / f"policies-{what.replace(' ', '-')}"
+        program = [programs.path("hlod-bench"), "policies", *folders, "--quiet"]
+        listed = ["--paths", ",".join(paths), "--targets", ",".join(map(str, targets))]
+        frames = ["--frames", str(arguments.frames), "--out", str(results)]
+        run([*program, *listed, *frames, *options])
+        say(f"done: {what}")
+        with open(results / "policies.csv", newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        with open(results / "policies.json", encoding="utf-8") as file:
+            return rows, json.load(file)
+
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        everywhere = pool.submit(replay, "everywhere", folders, PATHS, TARGETS, *pictures)
+        pops = pool.submit(replay, "every toggle", folders, POPPED, [TOLD], *popped)
+        fast = pool.submit(replay, "fast card", folders, PATHS, [FAST_TARGET], *pictures, *card)
+        still = pool.submit(replay, "standing", folders, ["still", "shake"], [TOLD], *none)
+        ahead = pool.submit(replay, "driving", folders, ["drive", "turn"], [TOLD], *none)
+        short = [
+            pool.submit(
+                replay,
+                f"short of memory {name}",
+                [folder],
+                ["turn", "orbit"],
+                [TOLD],
+                *none,
+                "--max-memory",
+                str(quarter(programs, folder)),
+            )
+            for name, folder in scenes
+        ]
+        if aside:
+            others = [folder for _, folder in aside]
+            kept_aside = pool.submit(replay, "kept aside", others, PATHS, [TOLD], *pictures)
+    # Alone, since it is timed.
+    selection = subprocess.check_output([programs.path("examples/selection_time")], text=True)
+    return {
+        "everywhere": everywhere.result()[0],
+        "means": everywhere.result()[1],
+        "pops": pops.result()[0],
+        "aside": kept_aside.result()[0] if aside else [],
+        "still": still.result()[0],
+        "ahead": ahead.result()[0],
+        "short": [row for one in short for row in one.result()[0]],
+        "fast": fast.result()[0],
+        "selection": selection,
+    }
+
+
+def quarter(programs, folder):
+    """A quarter of the bytes that all nodes take in memory; more where roots alone take half of that."""
+    inspect = [programs.path("hlod-build"), "inspect", "--json", folder]
+    scene = json.loads(subprocess.check_output(inspect))
+
+    def texels(pictures):
+        return sum(picture["width"] * picture["height"] for picture in pictures)
+
+    def held(node):
+        sizes = [node["vertices"], node["triangles"], node["texels"]]
+        return sum(size * each for size, each in zip(sizes, HELD))
+
+    shared = HELD[2] * texels(scene["shared_textures"])
+    roots = sum(held(node) for node in scene["nodes"] if node["parent"] is None)
+    return int(max((sum(map(held, scene["nodes"])) + shared) / 4, 2 * (roots + shared)))
 
 
 def parse():
@@ -100,113 +171,11 @@ def conditions(arguments):
         "stalls (one in 10 s, 15 ms), 1280 × 720, model clock with lavapipe's constants, a cap of "
         "1 GiB. FLIP is against the leaves, of three frames a run. *Late* are frames over the target "
         "by more than a tenth, *longest late* is how long they lasted in a row. *Used* is of the "
-        "target, in frames in which finer detail was in memory. *Estimate* is how far frames were "
+        "target, in frames in which finer detail was in memory. *Lacking* are frames in which a node "
+        "would have been drawn that was not in memory. *Estimate* is how far frames were "
         "from what the engine's cost model expected, mean and deviation. The oracle has everything in "
         "memory."
     )
-
-
-def mean(rows, column):
-    values = [float(row[column]) for row in rows if row[column]]
-    return statistics.fmean(values) if values else None
-
-
-def text(value, digits):
-    return "–" if value is None else f"{value:.{digits}f}".replace("-", "−")
-
-
-def policies(rows):
-    return list(dict.fromkeys(row["policy"] for row in rows))
-
-
-def at(rows, **wanted):
-    return [row for row in rows if all(row[key] == str(value) for key, value in wanted.items())]
-
-
-def everything(rows):
-    head = ["policy"] + [name for _, name, _ in COLUMNS]
-    body = []
-    for policy in policies(rows):
-        of = at(rows, policy=policy, target_ms=TOLD)
-        cells = [text(mean(of, column), digits) for column, _, digits in COLUMNS]
-        body.append([f"`{policy}`", *cells])
-    return f"All scenes and paths, target {TOLD} ms:\n\n" + table(head, body)
-
-
-def pareto(rows):
-    head = ["policy"] + [f"{target} ms" for target in TARGETS]
-    body = []
-    for policy in policies(rows):
-        cells = []
-        for target in TARGETS:
-            of = at(rows, policy=policy, target_ms=target)
-            flip, p95 = mean(of, "flip_mean"), mean(of, "frame_ms_p95")
-            cells.append(f"{text(flip, 4)} at {text(p95, 1)}")
-        body.append([f"`{policy}`", *cells])
-    return "FLIP at the 95th percentile of frame times in ms, by target:\n\n" + table(head, body)
-
-
-def pairs(figures):
-    first = figures["first"]
-    head = ["policy", "target, ms", "FLIP", "late, %", "toggles/min", "frame p95, ms"]
-    columns = [
-        ("flip_mean", 4),
-        ("late_percent", 1),
-        ("toggles_per_min", 0),
-        ("frame_ms_p95", 1),
-    ]
-    body = []
-    for at_target in figures["targets"]:
-        for policy, of in at_target["policies"].items():
-            if policy == first:
-                continue
-            cells = []
-            for column, digits in columns:
-                more = of[column]["more_than_first"]
-                cells.append(f"{text(more['mean'], digits)} ± {text(more['half'], digits)}")
-            body.append([f"`{policy}`", f"{at_target['target_ms']:.0f}", *cells])
-    return (
-        f"How much more than `{first}`, mean over pairs of runs along the same path with half of its "
-        "95 % interval:\n\n" + table(head, body)
-    )
-
-
-def pops(rows):
-    head = ["policy", "pops, ΣFLIP", "toggles/min"]
-    body = []
-    for policy in policies(rows):
-        of = at(rows, policy=policy)
-        cells = [text(mean(of, "pop_flip_sum"), 3), text(mean(of, "toggles_per_min"), 0)]
-        body.append([f"`{policy}`", *cells])
-    return (
-        f"The change of the image by every toggle of a run, {' and '.join(POPPED)}, target {TOLD} ms, means "
-        "over scenes:\n\n" + table(head, body)
-    )
-
-
-def by_path(rows, scene):
-    head = ["policy"] + [f"{path}: FLIP" if i == 0 else what for path in PATHS for i, what in enumerate(["FLIP", "late, %", "toggles/min"])]
-    body = []
-    for policy in policies(rows):
-        cells = []
-        for path in PATHS:
-            of = at(rows, policy=policy, target_ms=TOLD, scene=scene, path=path)
-            cells += [
-                text(mean(of, "flip_mean"), 4),
-                text(mean(of, "late_percent"), 1),
-                text(mean(of, "toggles_per_min"), 0),
-            ]
-        body.append([f"`{policy}`", *cells])
-    return table(head, body)
-
-
-def causes(rows):
-    head = ["policy"] + [name for _, name in CAUSES]
-    body = []
-    for policy in policies(rows):
-        of = at(rows, policy=policy, target_ms=TOLD)
-        body.append([f"`{policy}`", *[text(mean(of, column), 1) for column, _ in CAUSES]])
-    return table(head, body)
 
 
 if __name__ == "__main__":
