@@ -69,7 +69,7 @@ def flip(what, rows):
 
     def cell(name):
         value, ms = (mean(at(rows, policy=name), column) for column in ("flip_mean", "frame_ms_p95"))
-        less = "" if name == OURS else f", {text((ours / value - 1) * 100, 0)} %"
+        less = "" if name == OURS or not value else f", {text((ours / value - 1) * 100, 0)} %"
         return f"{text(value, 4)} at {text(ms, 1)} ms{less}"
 
     def value(name):
