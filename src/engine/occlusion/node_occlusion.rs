@@ -9,11 +9,12 @@ use super::surface::Surface;
 use crate::format::NodeMesh;
 use crate::mesh::UpAxis;
 
-/// Slabs of a node, at most: the largest,
-const MOST_SLABS: usize = 64;
+/// Slabs of a node, at most: the largest. Nodes of 2,000 triangles in houses have 198 in the median and 323
+/// at the 90th percentile; with 64 of each, a walk among them draws two thirds more triangles.
+const MOST_SLABS: usize = 320;
 
-/// and no more than one for so many triangles, so that small nodes hold little beside themselves,
-const TRIANGLES: usize = 8;
+/// No more than one for so many triangles, so that small nodes hold little beside themselves,
+const TRIANGLES: usize = 6;
 
 /// but as many as these.
 const LEAST_SLABS: usize = 4;
