@@ -19,6 +19,10 @@ use crate::{Error, Result};
 /// or whose clock jumped, has seen nothing meanwhile that it should forget anything for.
 const LONGEST_STEP_S: f64 = 1.0;
 
+/// Occluders are cut before the eye at this part of the scene's diagonal, so that scenes in any unit are
+/// alike.
+const NEAR: f64 = 1e-5;
+
 /// What policies see, apart from the view.
 struct Seen<'a> {
     tree: &'a SceneTree,
@@ -140,7 +144,8 @@ impl<'a> Engine<'a> {
     /// Finds out how much of nodes is seen past these, where the policy asks for it.
     pub fn look_past(&mut self, occluders: Arc<Occluders>) {
         if self.policy.wants_seen_areas() {
-            self.seen.seen = Some(SeenAreas::new(occluders));
+            let near = NEAR * self.seen.tree.diagonal();
+            self.seen.seen = Some(SeenAreas::new(occluders, near));
         }
     }
 

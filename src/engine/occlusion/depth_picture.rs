@@ -10,14 +10,13 @@ use crate::camera::View;
 /// Pixels across and up.
 pub(super) const SIZE: [usize; 2] = [160, 90];
 
-/// Metres before the eye at which triangles are cut.
-const NEAR: f32 = 1e-3;
-
 /// How far away what is seen is, by pixel, from the upper left, row by row.
 #[derive(Clone, Debug)]
 pub(super) struct DepthPicture {
     /// One over metres along the line of sight; 0 where nothing is seen.
     inverse: Vec<f32>,
+    /// Metres before the eye at which triangles are cut.
+    near: f32,
     eye: DVec3,
     /// Right and up, a metre being half of the picture at a depth of 1 m, and forward.
     axes: [DVec3; 3],
@@ -40,15 +39,17 @@ impl Corner {
         Self { at, pixel: [(1.0 + at.x * over) * half[0], (1.0 - at.y * over) * half[1]] }
     }
 
-    fn is_before(&self) -> bool {
-        self.at.z >= NEAR
+    fn is_before(&self, near: f32) -> bool {
+        self.at.z >= near
     }
 }
 
 impl DepthPicture {
-    pub fn new() -> Self {
+    /// Before any view; triangles are cut so many metres before the eye, above 0.
+    pub fn new(near: f32) -> Self {
         Self {
             inverse: vec![0.0; SIZE[0] * SIZE[1]],
+            near,
             eye: DVec3::ZERO,
             axes: [DVec3::ZERO; 3],
             corners: Vec::new(),
@@ -80,7 +81,7 @@ impl DepthPicture {
     }
 
     fn draw_triangle(&mut self, corners: [Corner; 3]) {
-        let [columns, rows] = pixels_around(&corners);
+        let [columns, rows] = pixels_around(&corners, self.near);
         if columns.is_empty() || rows.is_empty() {
             return;
         }
@@ -128,7 +129,7 @@ impl DepthPicture {
 }
 
 /// Columns and rows of pixels whose middles may be in a triangle.
-fn pixels_around(corners: &[Corner; 3]) -> [Range<usize>; 2] {
+fn pixels_around(corners: &[Corner; 3], near: f32) -> [Range<usize>; 2] {
     let [mut least, mut most] = [[f32::INFINITY; 2], [f32::NEG_INFINITY; 2]];
     let mut add = |corner: &Corner| {
         for axis in 0..2 {
@@ -138,12 +139,12 @@ fn pixels_around(corners: &[Corner; 3]) -> [Range<usize>; 2] {
     };
     for (index, a) in corners.iter().enumerate() {
         let b = &corners[(index + 1) % 3];
-        if a.is_before() {
+        if a.is_before(near) {
             add(a);
         }
-        if a.is_before() != b.is_before() {
-            let cut = a.at + (b.at - a.at) * ((NEAR - a.at.z) / (b.at.z - a.at.z));
-            add(&Corner::new(Vec3 { z: NEAR, ..cut }));
+        if a.is_before(near) != b.is_before(near) {
+            let cut = a.at + (b.at - a.at) * ((near - a.at.z) / (b.at.z - a.at.z));
+            add(&Corner::new(Vec3 { z: near, ..cut }));
         }
     }
     // Middles are at halves; rounding must not lose one.
@@ -161,6 +162,8 @@ mod tests {
     use super::*;
     use crate::random::Random;
     use crate::runtime::test_tree::view;
+
+    const NEAR: f32 = 1e-3;
 
     fn random_occluder(random: &mut Random) -> Occluder {
         let mut corner = || Vec3::from_array([0; 3].map(|_| random.between(-20.0, 20.0) as f32));
@@ -198,7 +201,7 @@ mod tests {
     #[test]
     fn depths_are_those_of_rays_through_the_middles_of_pixels() {
         let mut random = Random::new(3, 0);
-        let (mut picture, view) = (DepthPicture::new(), view());
+        let (mut picture, view) = (DepthPicture::new(NEAR), view());
         let (mut off, mut hits) = (0, 0);
         for _ in 0..10 {
             let occluder = random_occluder(&mut random);
@@ -223,7 +226,7 @@ mod tests {
         let origin = DVec3::new(2.0, 1.0, 0.0);
         let occluder =
             Occluder { bbox: [DVec3::ZERO; 2], origin, positions, triangles: vec![[0, 1, 2]] };
-        let mut picture = DepthPicture::new();
+        let mut picture = DepthPicture::new(NEAR);
         picture.begin(&view());
         picture.draw(&occluder);
         let mut points = Default::default();

@@ -53,11 +53,11 @@ pub struct SeenAreas {
 }
 
 impl SeenAreas {
-    /// Before any view.
-    pub fn new(occluders: Arc<Occluders>) -> Self {
+    /// Before any view; what is nearer to the eye than `near` metres, above 0, hides nothing.
+    pub fn new(occluders: Arc<Occluders>, near: f64) -> Self {
         Self {
             occluders,
-            picture: DepthPicture::new(),
+            picture: DepthPicture::new(near as f32),
             view: None,
             left: VecDeque::new(),
             since_s: f64::INFINITY,
@@ -188,7 +188,7 @@ mod tests {
     }
 
     fn areas(surfaces: Vec<Occluder>) -> SeenAreas {
-        SeenAreas::new(Arc::new(Occluders { surfaces }))
+        SeenAreas::new(Arc::new(Occluders { surfaces }), 1e-3)
     }
 
     /// The parts of what is under the boxes of two cubes, 2 m wide at 11.3 and 21.3 m, that are seen.
