@@ -210,14 +210,16 @@ impl Residency {
                 NodeState::Absent if self.nodes[node as usize].visited != self.frame => {
                     self.list.remove(node); // no longer of interest to anyone
                 }
-                NodeState::Absent if self.is_ahead(node) => {
-                    if self.may_load_ahead(node) && self.fits(node, &reservations) {
-                        self.ahead_bytes -= self.nodes[node as usize].bytes as f64;
-                        self.begin(node);
-                        return Some(self.chunk(node));
-                    }
+                NodeState::Absent if self.may_load_ahead(node, &reservations) => {
+                    self.ahead_bytes -= self.nodes[node as usize].bytes as f64;
+                    self.begin(node);
+                    return Some(self.chunk(node));
                 }
-                NodeState::Absent if self.wants(node) && self.reserve(node, &mut reservations) => {
+                NodeState::Absent
+                    if !self.is_ahead(node)
+                        && self.wants(node)
+                        && self.reserve(node, &mut reservations) =>
+                {
                     self.begin(node);
                     return Some(self.chunk(node));
                 }
@@ -238,14 +240,18 @@ impl Residency {
         self.nodes[node as usize].ahead == self.frame
     }
 
-    /// Whether a node that may be wanted soon can be loaded now, if it fits. Nothing is ever evicted for it,
+    /// Whether a node that may be wanted soon can be loaded now. Nothing is ever evicted for it,
     /// a part of the memory is left to what is wanted, and what was evicted once is read again only when it
     /// is wanted.
-    fn may_load_ahead(&self, node: u32) -> bool {
+    fn may_load_ahead(&self, node: u32, reservations: &Reservations) -> bool {
         let used = self.budget.used() + self.nodes[node as usize].bytes;
         let most = (1.0 - LEFT_FREE) * self.options.max_memory_bytes as f64;
-        let is_new = !self.loaded_before[node as usize];
-        is_new && self.ahead_bytes > 0.0 && used as f64 <= most && self.wants(node)
+        self.is_ahead(node)
+            && !self.loaded_before[node as usize]
+            && self.ahead_bytes > 0.0
+            && used as f64 <= most
+            && self.wants(node)
+            && self.fits(node, reservations)
     }
 
     /// Visited in the last frame, not in memory, and the parent is.
