@@ -78,7 +78,7 @@ def by_the_wall(programs, arguments):
     head = ["scene, path", "error, %", "standing, %", "frame, ms: mean / p95", "late, %", "toggles"]
     conditions = (
         f"Target 30 ms, 1280 × 720, {drawn}, {arguments.frames} frames a path after "
-        f"{settle(arguments)} at its first pose, `best-first`. *Error* is (actual − estimated) / "
+        f"{settle(arguments)} at its first pose, `gain-over-price`. *Error* is (actual − estimated) / "
         "estimated, mean ± deviation. *Standing* is how far the times of one and the same frame, of "
         "the camera that stands still, lie apart, which no estimate can foresee."
     )
@@ -99,7 +99,7 @@ def beside_the_thesis(programs, arguments):
         conditions(arguments, rows),
         results(rows, THESIS),
         sooner(rows, quick),
-        "The default policy, `best-first`, along the same paths:",
+        "The default policy, `gain-over-price`, along the same paths:",
         results(default, {}),
         memory(notes),
     ]
