@@ -83,12 +83,12 @@ def measure(arguments, programs, scenes, aside):
     popped = ["--reference-every", str(arguments.frames), "--seeds", "1", "--pops"]
     card = ["--constants", str(ROOT / "scripts" / "figures" / "fast-card.json")]
 
-    def replay(what, folders, paths, targets, *options):
+    def replay(what, folders, paths, targets, *options, frames=arguments.frames):
         results = programs.work / f"policies-{what.replace(' ', '-')}"
         program = [programs.path("hlod-bench"), "policies", *folders, "--quiet"]
         listed = ["--paths", ",".join(paths), "--targets", ",".join(map(str, targets))]
-        frames = ["--frames", str(arguments.frames), "--out", str(results)]
-        run([*program, *listed, *frames, *options])
+        listed += ["--frames", str(frames)]
+        run([*program, *listed, *options, "--out", str(results)])
         say(f"done: {what}")
         with open(results / "policies.csv", newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
@@ -97,7 +97,10 @@ def measure(arguments, programs, scenes, aside):
 
     with ThreadPoolExecutor(max_workers=2) as pool:
         everywhere = pool.submit(replay, "everywhere", folders, PATHS, TARGETS, *pictures)
-        pops = pool.submit(replay, "every toggle", folders, POPPED, [TOLD], *popped)
+        # Every frame with a toggle is drawn.
+        pops = pool.submit(
+            replay, "every toggle", folders, POPPED, [TOLD], *popped, frames=arguments.frames // 3
+        )
         fast = pool.submit(replay, "fast card", folders, PATHS, [FAST_TARGET], *pictures, *card)
         still = pool.submit(replay, "standing", folders, ["still", "shake"], [TOLD], *none)
         ahead = pool.submit(replay, "driving", folders, ["drive", "turn"], [TOLD], *none)

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use super::margin::Margin;
 use super::predict::predict;
+use super::settling::Settling;
 use super::steady::Steady;
 use super::{
     Backend, CostModel, FrameEstimate, FrameInput, FrameOutcome, FrameReport, FrontCheck,
@@ -65,6 +66,7 @@ pub struct Engine<'a> {
     backend: &'a mut dyn Backend,
     costs: CostModel,
     margin: Margin,
+    settling: Settling,
     front_load: FrontLoad,
     /// What the frame before drew, and took.
     drawn: Vec<u32>,
@@ -106,6 +108,7 @@ impl<'a> Engine<'a> {
             let residency = lock(&residency)?;
             (residency.memory_use(), residency.counters())
         };
+        let mut margin = Margin::default();
         Ok(Self {
             seen: Seen {
                 tree,
@@ -115,7 +118,7 @@ impl<'a> Engine<'a> {
                 predicted: Vec::new(),
                 residents: Residents::none(tree.len()),
                 memory,
-                steady: Steady::new(&costs),
+                steady: Steady::new(&costs, margin.ratio()),
                 target_ms,
                 dt_s: 0.0,
             },
@@ -123,7 +126,8 @@ impl<'a> Engine<'a> {
             residency,
             backend,
             costs,
-            margin: Margin::default(),
+            margin,
+            settling: Settling::default(),
             front_load: FrontLoad::default(),
             drawn: Vec::new(),
             load: Load::default(),
@@ -248,7 +252,8 @@ impl<'a> Engine<'a> {
 
     /// Sets what was expected of a frame beside what it took, and learns from it.
     fn estimate(&mut self, view: &View, changes: &Changes, report: &mut FrameReport) {
-        let (costs, &Seen { tree, dt_s, .. }) = (&mut self.costs, &self.seen);
+        let (costs, &Seen { tree, target_ms, dt_s, ref steady, .. }) =
+            (&mut self.costs, &self.seen);
         let whole = self.front_load.of(tree, &self.drawn, view, changes.arrived_bytes);
         let drawn = Load { uploaded_bytes: 0.0, ..whole };
         let modelled = costs.estimate(&whole);
@@ -260,7 +265,10 @@ impl<'a> Engine<'a> {
         });
         report.estimated_ms = estimate.ms;
         report.estimated_without_feedback_ms = estimate.without_feedback_ms;
-        self.margin.observe(costs.priced_ms(&drawn), report.frame_ms, dt_s);
+        if self.settling.is_over(report.arrived, report.waiting, dt_s) {
+            let (expected_ms, budget_ms) = (costs.priced_ms(&drawn), steady.budget_ms(target_ms));
+            self.margin.observe(expected_ms, report.frame_ms, budget_ms, dt_s);
+        }
         costs.observe(&whole, report.frame_ms, report.gpu_ms, dt_s);
         self.load = drawn;
     }

@@ -31,6 +31,17 @@ const RUN: usize = 3;
 /// which is fast again, and the run forgotten, once as many frames in a row are no stalls any more.
 const AFTER_RUN: usize = 10;
 
+/// How much longer frames take than estimated, before any is known: budgets are approached from below,
+/// since what gives way may not return before it has rested.
+const FIRST: f64 = 1.05;
+
+/// Of so many frames. Before, those not yet known count as if they took that much longer.
+const FEW: usize = 20;
+
+/// Frames that neither take nor are expected to take this part of their budget say nothing of those
+/// that fill it: what has no price is most of them.
+const FILLED: f64 = 0.5;
+
 /// However wrong estimates were, budgets stay within this of the target.
 const RANGE: [f64; 2] = [0.5, 2.0];
 
@@ -50,12 +61,13 @@ pub struct Margin {
 }
 
 impl Margin {
-    /// By how much the target is divided for what frames may be expected to take; 1 before any.
+    /// By how much the target is divided for what frames may be expected to take.
     pub fn ratio(&mut self) -> f64 {
         self.sorted.clear();
         self.sorted.extend(self.ratios.iter().map(|&(_, ratio)| ratio));
+        self.sorted.resize(self.sorted.len().max(FEW), FIRST);
         self.sorted.sort_unstable_by(f64::total_cmp);
-        let Some(&median) = self.sorted.get(self.sorted.len() / 2) else { return 1.0 };
+        let median = self.sorted[self.sorted.len() / 2];
         let steady = self.sorted.partition_point(|&ratio| ratio <= STALL * median);
         if self.sorted.len() - steady <= (STALLS * self.sorted.len() as f64) as usize {
             self.sorted.truncate(steady);
@@ -67,19 +79,20 @@ impl Margin {
         at_most(KEPT).max(at_most(NOT_LATE) / LATE).clamp(RANGE[0], RANGE[1])
     }
 
-    /// A frame, `dt_s` seconds after the one before, took `actual_ms`. What is no number or took
-    /// no time is passed over.
-    pub fn observe(&mut self, expected_ms: f64, actual_ms: f64, dt_s: f64) {
+    /// A frame of a budget, `dt_s` seconds after the one before, took `actual_ms`. What is no number,
+    /// took no time or far less than the budget is passed over.
+    pub fn observe(&mut self, expected_ms: f64, actual_ms: f64, budget_ms: f64, dt_s: f64) {
         self.now_s += if dt_s.is_finite() { dt_s.max(0.0) } else { 0.0 };
+        let is_old = |at: &(f64, f64)| at.0 < self.now_s - WINDOW_S;
+        while self.ratios.len() >= MOST_FRAMES || self.ratios.front().is_some_and(is_old) {
+            self.ratios.pop_front();
+        }
         let ratio = actual_ms / expected_ms;
-        if !(ratio > 0.0 && ratio.is_finite()) {
+        let is_filled = expected_ms.max(actual_ms) >= FILLED * budget_ms;
+        if !(is_filled && ratio > 0.0 && ratio.is_finite()) {
             return;
         }
         self.ratios.push_back((self.now_s, ratio));
-        let is_old = |at: &(f64, f64)| at.0 < self.now_s - WINDOW_S;
-        while self.ratios.len() > MOST_FRAMES || self.ratios.front().is_some_and(is_old) {
-            self.ratios.pop_front();
-        }
         self.forget_run();
     }
 
@@ -103,8 +116,8 @@ mod tests {
     const FRAME_S: f64 = 1.0 / 30.0;
 
     #[test]
-    fn before_any_frame_the_whole_target_is_to_spend() {
-        assert_eq!(Margin::default().ratio(), 1.0);
+    fn before_any_frame_some_of_the_target_is_kept_free() {
+        assert_eq!(Margin::default().ratio(), FIRST);
     }
 
     #[test]
@@ -127,7 +140,7 @@ mod tests {
                 for (found, at_least_ms) in found.iter_mut().zip([33.0, 30.0]) {
                     *found += u32::from(frame >= 300 && actual_ms > at_least_ms * (1.0 + 1e-9));
                 }
-                margin.observe(budget_ms, actual_ms, FRAME_S);
+                margin.observe(budget_ms, actual_ms, 30.0, FRAME_S);
             }
             let percent = found.map(|found| f64::from(found) / 30.0);
             let is_right = late.contains(&percent[0]) && over.contains(&percent[1]);
@@ -139,7 +152,7 @@ mod tests {
     fn a_single_stall_costs_nothing_and_a_slow_machine_is_soon_known() {
         let mut margin = Margin::default();
         let mut observe = |ratio: f64, frames: usize| {
-            (0..frames).for_each(|_| margin.observe(10.0, 10.0 * ratio, FRAME_S));
+            (0..frames).for_each(|_| margin.observe(10.0, 10.0 * ratio, 10.0, FRAME_S));
             margin.ratio()
         };
         observe(1.0, 600);
@@ -155,20 +168,44 @@ mod tests {
     fn what_stalls_again_and_again_is_remembered() {
         let mut margin = Margin::default();
         for _ in 0..10 {
-            [1.0; 18].iter().for_each(|ratio| margin.observe(10.0, 10.0 * ratio, FRAME_S));
-            [2.0; 2].iter().for_each(|ratio| margin.observe(10.0, 10.0 * ratio, FRAME_S));
+            [1.0; 18].iter().for_each(|ratio| margin.observe(10.0, 10.0 * ratio, 10.0, FRAME_S));
+            [2.0; 2].iter().for_each(|ratio| margin.observe(10.0, 10.0 * ratio, 10.0, FRAME_S));
         }
-        (0..30).for_each(|_| margin.observe(10.0, 10.0, FRAME_S));
+        (0..30).for_each(|_| margin.observe(10.0, 10.0, 10.0, FRAME_S));
         assert_eq!(margin.ratio(), 2.0 / LATE);
+    }
+
+    #[test]
+    fn the_first_frames_are_told_from_noise_once_there_are_enough() {
+        let mut margin = Margin::default();
+        let mut observe = |ratio: f64| {
+            margin.observe(10.0, 10.0 * ratio, 10.0, FRAME_S);
+            margin.ratio()
+        };
+        assert_eq!(observe(0.8), FIRST);
+        (0..15).for_each(|_| assert_eq!(observe(1.0), FIRST));
+        assert_eq!(observe(1.0), 1.0);
+    }
+
+    #[test]
+    fn frames_that_draw_little_say_nothing_however_long_they_go_on() {
+        let mut margin = Margin::default();
+        (0..60).for_each(|_| margin.observe(9.0, 9.0, 10.0, FRAME_S));
+        (0..300).for_each(|_| margin.observe(0.5, 0.6, 10.0, FRAME_S));
+        assert_eq!(margin.ratio(), 1.0);
+        (0..300).for_each(|_| margin.observe(0.5, 0.6, 10.0, FRAME_S));
+        assert_eq!(margin.ratio(), FIRST, "nothing is known any more");
+        (0..600).for_each(|_| margin.observe(2.0, 10.0, 10.0, FRAME_S));
+        assert_eq!(margin.ratio(), 2.0, "unless they take all of it");
     }
 
     #[test]
     fn odd_frames_are_passed_over() {
         let mut margin = Margin::default();
         for odd in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            margin.observe(odd, 1.0, odd);
-            margin.observe(1.0, odd, odd);
+            margin.observe(odd, 1.0, 1.0, odd);
+            margin.observe(1.0, odd, 1.0, odd);
         }
-        assert_eq!(margin.ratio(), 1.0);
+        assert_eq!(margin.ratio(), FIRST);
     }
 }

@@ -19,6 +19,7 @@ mod policy;
 mod predict;
 mod report;
 mod residents;
+mod settling;
 mod steady;
 #[cfg(test)]
 pub(crate) mod test_frame;

@@ -24,8 +24,8 @@ pub(super) struct Steady {
 
 impl Steady {
     /// Before any frame.
-    pub fn new(costs: &CostModel) -> Self {
-        Self { costs: costs.clone(), ratio: 1.0 }
+    pub fn new(costs: &CostModel, ratio: f64) -> Self {
+        Self { costs: costs.clone(), ratio }
     }
 
     /// The cost model to choose by.
@@ -66,7 +66,7 @@ mod tests {
 
     /// Frames of 30 ms by which the budget goes once prices and ratio have changed from 1.
     fn budget_of(price: f64, ratio: f64, is_still: bool) -> (f64, f64) {
-        let mut steady = Steady::new(&CostModel::new(&triangles_alone(1.0)));
+        let mut steady = Steady::new(&CostModel::new(&triangles_alone(1.0)), 1.0);
         let costs = CostModel::new(&triangles_alone(price));
         steady.follow(&costs, ratio, &DRAWN, is_still);
         (steady.costs().priced_ms(&DRAWN), steady.budget_ms(30.0))
@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn where_nothing_is_known_to_take_time_whatever_is_learned_is_followed() {
-        let mut steady = Steady::new(&CostModel::new(&triangles_alone(0.0)));
+        let mut steady = Steady::new(&CostModel::new(&triangles_alone(0.0)), 1.0);
         let costs = CostModel::new(&triangles_alone(2.0));
         steady.follow(&costs, 1.0, &DRAWN, true);
         assert_eq!(steady.costs().priced_ms(&DRAWN), 200.0);
