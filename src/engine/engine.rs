@@ -287,7 +287,9 @@ impl<'a> Engine<'a> {
 
     /// Nodes of its front that it did not draw, since those drawn hide them.
     pub fn hidden(&self) -> Vec<u32> {
-        let is_hidden = |node: &u32| !self.drawn.contains(node);
+        // What is drawn is in the front's order.
+        let mut drawn = self.drawn.iter().peekable();
+        let is_hidden = |node: &u32| drawn.next_if_eq(&node).is_none();
         self.selection.front.iter().copied().filter(is_hidden).collect()
     }
 

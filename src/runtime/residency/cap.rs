@@ -118,10 +118,12 @@ impl Residency {
         }
     }
 
-    /// By what nodes are ordered: whether the last frame drew or visited them, and their priority.
+    /// By what nodes are ordered: whether the last frame drew or visited them, rather than that they may
+    /// be wanted soon, and their priority.
     fn usefulness(&self, node: u32) -> (bool, u64) {
         let record = &self.nodes[node as usize];
-        let is_wanted = [record.visited, record.needed].contains(&self.frame);
+        let is_visited = record.visited == self.frame && record.ahead != self.frame;
+        let is_wanted = is_visited || record.needed == self.frame;
         // Numbers of at least 0 are in the order of their bits.
         (is_wanted, self.list.priority(node).max(0.0).to_bits())
     }

@@ -3,6 +3,8 @@
 //! tells what was read.
 
 mod cap;
+#[cfg(test)]
+mod cap_tests;
 mod eviction;
 mod list;
 mod manager;
