@@ -22,6 +22,7 @@ mod rays;
 #[allow(dead_code)]
 mod support;
 mod surfaces;
+mod twice;
 mod visibility;
 
 use adapter::or_skip;
