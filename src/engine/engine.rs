@@ -181,7 +181,8 @@ impl<'a> Engine<'a> {
         let seen = &mut self.seen;
         predict(self.pose.as_ref(), view, seen.dt_s, &mut seen.predicted);
         seen.visibility.begin_frame(seen.tree.len());
-        let is_still = changes.arrived.is_empty() && self.pose == Some(view.pose);
+        let is_still =
+            changes.arrived.is_empty() && self.pose == Some(view.pose) && self.margin.is_known();
         seen.steady.follow(&self.costs, self.margin.ratio(), &self.load, is_still);
 
         let before = self.backend.now_ms();

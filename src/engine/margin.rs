@@ -79,6 +79,11 @@ impl Margin {
         at_most(KEPT).max(at_most(NOT_LATE) / LATE).clamp(RANGE[0], RANGE[1])
     }
 
+    /// Whether as many frames are known as are needed, since more than one frame.
+    pub fn is_known(&self) -> bool {
+        self.ratios.len() > FEW
+    }
+
     /// A frame of a budget, `dt_s` seconds after the one before, took `actual_ms`. What is no number,
     /// took no time or far less than the budget is passed over.
     pub fn observe(&mut self, expected_ms: f64, actual_ms: f64, budget_ms: f64, dt_s: f64) {
@@ -185,6 +190,9 @@ mod tests {
         assert_eq!(observe(0.8), FIRST);
         (0..15).for_each(|_| assert_eq!(observe(1.0), FIRST));
         assert_eq!(observe(1.0), 1.0);
+        assert!(!margin.is_known());
+        (0..4).for_each(|_| margin.observe(10.0, 10.0, 10.0, FRAME_S));
+        assert!(margin.is_known());
     }
 
     #[test]

@@ -115,7 +115,9 @@ impl Levels {
         let level = &mut self.nodes[node as usize];
         let is_to_blame = self.slow_s.is_none_or(|slow_s| self.now_s - slow_s > AFTER_SLOW_S);
         let is_back = is_to_blame && self.now_s - level.changed_s < BACK_WITHIN_S;
-        level.rest_s = match is_back {
+        // What was refined in this very frame was never seen so.
+        let was_seen = level.changed_s < self.now_s;
+        level.rest_s = match is_back && was_seen {
             true => (level.rest_s * LONGER).clamp(options.backoff_s, LONGEST_S),
             false => options.dwell_s,
         };

@@ -30,6 +30,9 @@ use levels::Levels;
 /// A frame is full from this part of its budget on.
 const FULL: f64 = 0.9;
 
+/// So often at most a front is summed up in a frame and relieved of what it takes too long.
+const MOST_ROUNDS: usize = 8;
+
 const NAME: &str = "gain-over-price";
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -196,6 +199,19 @@ impl GainOverPrice {
         ms
     }
 
+    /// The same of the front as it came to be: finer nodes also hide and cover other parts of the
+    /// image, and coarser ones may cover more, which no node's price says.
+    fn relieve_whole(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
+        for _ in 0..MOST_ROUNDS {
+            let ms = front_ms(frame, &out.front);
+            if self.relieve(frame, ms) == ms {
+                break;
+            }
+            self.walk(frame);
+            self.front_into(out);
+        }
+    }
+
     /// Refines while there is time, or what makes way; milliseconds that the frame then takes.
     fn refine(&mut self, frame: &FrameInput<'_>, mut ms: f64) -> f64 {
         while let Some(Ranked { rank, node }) = self.upgrades.pop() {
@@ -310,10 +326,7 @@ impl Policy for GainOverPrice {
         if self.levels.have_changed() {
             self.walk(frame);
             self.front_into(out);
-            // Finer nodes also hide and cover other parts of the image, which none of them pays for.
-            self.relieve(frame, front_ms(frame, &out.front));
-            self.walk(frame);
-            self.front_into(out);
+            self.relieve_whole(frame, out);
         }
         out.lacking = self.lacking(frame, ms, least);
         self.request(frame, out);
