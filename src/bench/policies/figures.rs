@@ -108,7 +108,8 @@ impl PolicyRun {
             per_min(|frame| frame.report.toggle_causes.evicted),
             per_min(|frame| frame.report.toggle_causes.came_into_view),
             mean(of(|frame| f64::from(u8::from(frame.report.lacking > 0)))) * 100.0,
-            if inspected.every_toggle { pops.iter().sum() } else { f64::NAN },
+            // Without any, −0 would be said.
+            if inspected.every_toggle { 0.0 + pops.iter().sum::<f64>() } else { f64::NAN },
             mb(sum(|frame| frame.report.read_bytes)),
             mb(sum(|frame| frame.report.reread_bytes)),
             mb(run.peak_bytes),
