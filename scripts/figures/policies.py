@@ -136,7 +136,7 @@ def measure(arguments, programs, scenes, aside):
 
 
 def quarter(programs, folder):
-    """A quarter of the bytes that all nodes take in memory; more where roots alone take half of that."""
+    """A quarter of the bytes that all nodes take in memory; more where roots alone take a third of that."""
     inspect = [programs.path("hlod-build"), "inspect", "--json", folder]
     scene = json.loads(subprocess.check_output(inspect))
 
@@ -149,7 +149,7 @@ def quarter(programs, folder):
 
     shared = HELD[2] * texels(scene["shared_textures"])
     roots = sum(held(node) for node in scene["nodes"] if node["parent"] is None)
-    return int(max((sum(map(held, scene["nodes"])) + shared) / 4, 2 * (roots + shared)))
+    return int(max((sum(map(held, scene["nodes"])) + shared) / 4, 3 * (roots + shared)))
 
 
 def parse():
