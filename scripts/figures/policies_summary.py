@@ -10,6 +10,8 @@ THESIS = "lakhia"
 ORACLE = "oracle"
 # Image errors that are no further apart than this are the same.
 SAME = 0.02
+# Percent of frames that may be late.
+LATE = 1
 # Policies as near to the least image error as this are compared by how much their images jump.
 NEAR = 0.05
 
@@ -25,6 +27,7 @@ def table_of(figures):
     ]
     for target in TARGETS:
         rows.append(flip(f"FLIP at {target} ms", at(everywhere, target_ms=target)))
+    rows.append(flip(f"FLIP at {TOLD} ms, on paths along which frames can keep to it", possible(told)))
     if figures["aside"]:
         rows.append(flip(f"FLIP at {TOLD} ms, scenes kept aside", figures["aside"]))
     rows.append(flip("FLIP at 1 ms with a fast card's constants", figures["fast"]))
@@ -78,6 +81,12 @@ def flip(what, rows):
     names = [name for name in others(rows) if mean(at(rows, policy=name), "frame_ms_p95") <= 1.02 * p95]
     best = min(names or others(rows), key=value)
     return [what, cell(OURS), cell(THESIS), f"{cell(best)}, `{best}`"]
+
+
+def possible(rows):
+    """Runs where some policy is hardly ever late: elsewhere roots alone take too long, and none can choose."""
+    places = {(row["scene"], row["path"]) for row in rows if float(row["late_percent"]) <= LATE}
+    return [row for row in rows if (row["scene"], row["path"]) in places]
 
 
 def lowest(rows):
