@@ -163,7 +163,7 @@ def plot(rows, targets, file):
                 points.append([mean(there, column) for column in ("frame_ms_p95", "flip_mean")])
             ours = {"linewidth": 2.5, "zorder": 3} if name == OURS else {"linewidth": 1}
             axis.plot(*zip(*sorted(points)), marker=marker, label=name, **ours)
-        axis.set(title=path or "all paths", xlabel="p95 frame time, ms", xscale="log", yscale="log")
+        axis.set(title=path or "all paths", xlabel="p95 frame time, ms", yscale="log")
     axes[0].set_ylabel("FLIP")
     axes[0].legend(fontsize=8)
     figure.tight_layout()
