@@ -90,7 +90,9 @@ fn specks_change_nothing() {
             ("triangles drawn", 0.03),
             ("nodes", 0.05),
             ("stored", 0.75),
-            ("toggles", 0.03),
+            // 67 of 75. What does not fit is tried again after half a second, and the last percent of the
+            // budget, which wide ones take, decides each time.
+            ("toggles", 0.12),
         ],
         "wide ones keep some of the budget, so that other levels fit",
     );
