@@ -154,7 +154,7 @@ def quarter(programs, folder):
 
 def parse():
     options = Options("policies", __doc__, "a small city, 90 frames, one seed")
-    options.add_argument("--frames", type=int, default=900, help="frames of each path [900]")
+    options.add_argument("--frames", type=int, default=450, help="frames of each path, a third of them for every toggle [450]")
     options.add_argument("--seeds", type=int, default=1, help="routes and noises [1]")
     arguments = options.parse()
     if arguments.quick:
