@@ -90,8 +90,8 @@ fn specks_change_nothing() {
             ("triangles drawn", 0.03),
             ("nodes", 0.05),
             ("stored", 0.75),
-            // 67 of 75, where twins differ by 4.5 %. Not traced: since what did not fit is tried again
-            // after half a second rather than 16, the last percent of the budget may decide each time.
+            // 67 of 75, where twins differ by 4.5 %: what did not fit is tried again after half a second,
+            // and the last percent of the budget decides each time. Within 4.5 % where it rests for 16 s.
             ("toggles", 0.12),
         ],
         "wide ones keep some of the budget, so that other levels fit",
