@@ -8,6 +8,7 @@
 pub mod bench;
 pub mod builder;
 pub mod camera;
+pub mod cells;
 pub mod city;
 pub mod color;
 pub mod cpu_time;

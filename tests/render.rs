@@ -14,7 +14,7 @@ use hlod::format::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 use hlod::mesh::{AlphaMode, Wrap};
 use hlod::picture_error::mean_squared_error;
 use hlod::render::content::{Content, Picture, TextureFormat};
-use hlod::render::{RenderOptions, Renderer, Shading, level_tint};
+use hlod::render::{RenderOptions, Renderer, Shading, Side, level_tint};
 use image::{Rgba, RgbaImage};
 
 const SIZE: u32 = 64;
@@ -542,4 +542,92 @@ fn what_cannot_be_had_is_refused() {
         let error = Renderer::new(&RenderOptions { size, ..options() }).err().expect("a size");
         assert_eq!(error.exit_code(), 2, "{error}");
     }
+}
+
+#[test]
+fn nodes_are_cut_at_a_box_and_both_sides_of_it_are_the_whole() {
+    // A floor from 1 to 9 m ahead, and a wall behind the box.
+    let mut floor = rectangle([-4.0, 4.0], [-1.0, -1.0], 1.0, plain(RED));
+    floor.positions =
+        [[-4.0, -1.0], [4.0, -1.0], [4.0, -9.0], [-4.0, -9.0]].map(|[x, z]| [x, -1.0, z]).to_vec();
+    let picture = RgbaImage::from_pixel(4, 4, Rgba([0, 255, 0, 255]));
+    let surface = Surface { image: Some(0), ..plain([1.0; 3]) };
+    let mut scene = mesh(vec![floor, rectangle([-1.0, 1.0], [-1.0, 2.0], 8.0, surface)]);
+    scene.images = vec![png(&picture)];
+    let Some(whole) = shot(&options(), &scene) else { return };
+    let cut_at = [DVec3::new(-2.0, -3.0, -4.0), DVec3::new(2.0, 3.0, 0.0)];
+    let [inside, outside] = [Side::Inside, Side::Outside].map(|side| {
+        let mut renderer = renderer(&RenderOptions { cut: Some(side), ..options() }).unwrap();
+        renderer.upload(0, 0, &content(&scene)).unwrap();
+        renderer.draw(&[0], &pose(), 0.1).unwrap();
+        assert_eq!(renderer.snapshot().unwrap(), whole, "no box yet");
+        renderer.cut_at(Some(cut_at));
+        renderer.draw(&[0], &pose(), 0.1).unwrap();
+        renderer.surface().unwrap()
+    });
+    let (mut of_inside, mut of_outside) = (0, 0);
+    for (x, y, pixel) in whole.enumerate_pixels() {
+        let sides = [inside.get_pixel(x, y), outside.get_pixel(x, y)];
+        let drawn = sides.map(|side| side.0[3] > 0);
+        assert!(!(drawn[0] && drawn[1]), "{x} {y}: twice");
+        let (place_x, place_y) = ((x as f32 + 0.5) / 32.0 - 1.0, 1.0 - (y as f32 + 0.5) / 32.0);
+        if place_y < 0.0 && place_y > -1.0 {
+            // The floor, -1 / place_y metres ahead.
+            let ahead = -1.0 / place_y;
+            let is_in_box = ahead < 4.0 && (place_x * ahead).abs() < 2.0;
+            let is_near_edge =
+                (ahead - 4.0).abs() < 0.3 || ((place_x * ahead).abs() - 2.0).abs() < 0.2;
+            if drawn[0] && !is_near_edge {
+                assert!(is_in_box, "{x} {y}: {ahead} m");
+            }
+        }
+        of_inside += u32::from(drawn[0]);
+        of_outside += u32::from(drawn[1]);
+        let seen = if drawn[0] { sides[0] } else { sides[1] };
+        if drawn[0] || drawn[1] {
+            assert_eq!(seen.0[..3], pixel.0[..3], "{x} {y}");
+        } else {
+            assert_near([pixel.0[0], pixel.0[1], pixel.0[2]], BACKGROUND, 0);
+        }
+    }
+    assert!(of_inside > 100 && of_outside > 100, "{of_inside} {of_outside}");
+}
+
+#[test]
+fn a_picture_is_projected_from_where_it_was_taken_whatever_the_triangles() {
+    // A plane that goes away to the right under a picture of stripes that was taken from the origin.
+    let stripes = RgbaImage::from_fn(SIZE, SIZE, |x, _| match x / 8 % 2 {
+        0 => Rgba([255, 0, 0, 255]),
+        _ => Rgba([0, 0, 255, 255]),
+    });
+    let surface = Surface { image: Some(0), wrap: [Wrap::Clamp; 2], ..plain([1.0; 3]) };
+    let mut plane = rectangle([-1.0, 1.0], [-1.0, 1.0], 1.0, surface);
+    let corner = |right: f32, up: f32| {
+        let far = 2.0 + 1.9 * right;
+        ([right * far, up * far, -far], [(right + 1.0) / 2.0, (1.0 - up) / 2.0])
+    };
+    let corners = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+    plane.positions = corners.map(|at| at.0).to_vec();
+    plane.texcoords = corners.map(|at| at.1).to_vec();
+    let mut scene = mesh(vec![plane]);
+    scene.images = vec![png(&stripes)];
+    let Some(mut renderer) = renderer(&options()) else { return };
+    let mut content = content(&scene);
+    let mut error = |projection| {
+        content.draws[0].projection = projection;
+        renderer.upload(0, 0, &content).unwrap();
+        renderer.draw(&[0], &pose(), 0.05).unwrap();
+        let drawn = renderer.snapshot().unwrap();
+        let rgb = |image: &RgbaImage| {
+            image::RgbImage::from_fn(SIZE, SIZE, |x, y| {
+                let [r, g, b, _] = image.get_pixel(x, y).0;
+                image::Rgb([r, g, b])
+            })
+        };
+        mean_squared_error(&rgb(&stripes), &rgb(&drawn)).unwrap()
+    };
+    let projected = error(Some([0.0, 0.0, -1.0, 0.0]));
+    assert!(projected < 1.0, "{projected}");
+    let bent = error(None);
+    assert!(bent > 1000.0, "{bent}");
 }

@@ -1,5 +1,6 @@
 //! How far what is drawn is from what could be.
 
+use glam::DVec3;
 use image::RgbaImage;
 
 use crate::Result;
@@ -85,6 +86,10 @@ pub struct FrameSample<'a> {
     pub view: &'a View,
     /// What was drawn.
     pub front: &'a [u32],
+    /// Faces of cells that were drawn, by their numbers.
+    pub faces: &'a [u32],
+    /// The box at which nodes were cut, outside of which faces were drawn.
+    pub cull_box: Option<[DVec3; 2]>,
     /// The rest of the front, which was not drawn since this hides it.
     pub hidden: &'a [u32],
     /// The front of the frame before, where levels toggled since.

@@ -41,4 +41,6 @@ pub use summary::{Context, SUMMARY_VERSION, summary, summary_text};
 pub use sweep::Sweep;
 #[cfg(feature = "render")]
 pub use wall::{Calibration, GpuBackend, Snapshots, calibrate, measure_start};
+#[cfg(feature = "render")]
+pub(crate) use write::write_beside;
 pub use write::{check_output, write_run};

@@ -13,6 +13,7 @@ use super::model_load::TileLoad;
 use super::model_occlusions::ModelOcclusions;
 use crate::camera::View;
 use crate::engine::{Backend, Drawn, NodeOcclusion, lock};
+use crate::format::cells::Cells;
 use crate::random::Random;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::{Changes, Residency};
@@ -32,6 +33,7 @@ pub struct ModelBackend<'a> {
     /// Bytes that loading had time for and did not read, or the other way round below 0.
     credit: f64,
     load: TileLoad,
+    cells: Option<Arc<Cells>>,
     occlusions: Option<Arc<ModelOcclusions>>,
 }
 
@@ -47,8 +49,14 @@ impl<'a> ModelBackend<'a> {
             dt_s: 0.0,
             credit: 0.0,
             load: TileLoad::default(),
+            cells: None,
             occlusions: None,
         }
+    }
+
+    /// Draws the faces of cells as well.
+    pub fn with_cells(self, cells: Option<Arc<Cells>>) -> Self {
+        Self { cells, ..self }
     }
 
     /// Knows what nodes hide: that alone is read from files.
@@ -92,7 +100,8 @@ impl Backend for ModelBackend<'_> {
     }
 
     fn draw(&mut self, front: &[u32], view: &View) -> Result<Drawn> {
-        let load = self.load.of(self.tree, front, view);
+        let faces = self.cells.as_ref().map_or(&[][..], |cells| &cells.faces);
+        let load = self.load.of(self.tree, faces, front, view);
         let ClockConstants { prices, cold_byte, .. } = self.constants;
         let both = self.constants.drawing_ms(&load);
         let cold = cold_byte * self.cold_bytes as f64;

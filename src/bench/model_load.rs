@@ -3,8 +3,11 @@
 //! Apart from draw calls, vertices and triangles it shares nothing with the engine's cost model,
 //! whose fragments are hidden by the whole of what is nearer, wherever in the image that is.
 
+use glam::DVec3;
+
 use crate::camera::View;
-use crate::runtime::SceneTree;
+use crate::format::cells::Face;
+use crate::runtime::{SceneTree, TreeNode};
 
 /// Tiles across and up the image.
 const TILES: [usize; 2] = [32, 18];
@@ -35,6 +38,48 @@ impl ModelLoad {
     }
 }
 
+/// What is drawn of a front at once.
+struct Drawn {
+    bbox: [DVec3; 2],
+    draws: f64,
+    vertices: f64,
+    triangles: f64,
+    /// The part that is textured, 0 to 1.
+    textured: f64,
+    /// The part of what is under its box that it fills, 0 to 1.
+    filled: f64,
+}
+
+impl Drawn {
+    fn of_node(node: &TreeNode) -> Self {
+        let triangles = f64::from(node.triangles);
+        Self {
+            bbox: node.bbox,
+            draws: f64::from(node.draws),
+            vertices: f64::from(node.vertices),
+            triangles,
+            textured: f64::from(node.textured_triangles) / triangles.max(1.0),
+            filled: 1.0,
+        }
+    }
+
+    fn of_face(face: &Face, view: &View) -> Self {
+        let bbox = face.bounds.map(DVec3::from_array);
+        let [width, height] = view.size.map(f64::from);
+        let angle: f64 = face.views.iter().map(|at| f64::from(at.solid_angle)).sum();
+        let pixels = angle * view.pixels_per_metre() * view.pixels_per_metre();
+        let under = view.frustum.covered(bbox) * width * height;
+        Self {
+            bbox,
+            draws: face.views.len() as f64,
+            vertices: f64::from(face.vertices),
+            triangles: f64::from(face.triangles),
+            textured: 1.0,
+            filled: if under > 0.0 { (pixels / under).min(1.0) } else { 0.0 },
+        }
+    }
+}
+
 /// Sums up what fronts ask for; keeps its memory from one to the next.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TileLoad {
@@ -45,11 +90,25 @@ pub(super) struct TileLoad {
 }
 
 impl TileLoad {
-    pub fn of(&mut self, tree: &SceneTree, front: &[u32], view: &View) -> ModelLoad {
+    /// Numbers in `front` from the number of nodes on are those of faces of cells.
+    pub fn of(
+        &mut self,
+        tree: &SceneTree,
+        faces: &[Face],
+        front: &[u32],
+        view: &View,
+    ) -> ModelLoad {
+        let nodes = tree.len() as u32;
+        let face = |number: u32| number.checked_sub(nodes).map(|at| &faces[at as usize]);
         let eye = view.pose.position;
-        let distance = |node: u32| {
-            let [min, max] = tree.node(node).bbox;
-            (eye.distance_squared(eye.clamp(min, max)), node)
+        let distance = |number: u32| {
+            let [min, max] = match face(number) {
+                Some(face) => face.bounds.map(DVec3::from_array),
+                None => tree.node(number).bbox,
+            };
+            // Faces are around the eye, and drawn after all else.
+            let after = if number < nodes { 0.0 } else { f64::MAX / 2.0 };
+            (after + eye.distance_squared(eye.clamp(min, max)), number)
         };
         self.near_to_far.clear();
         self.near_to_far.extend(front.iter().map(|&node| distance(node)));
@@ -60,22 +119,24 @@ impl TileLoad {
         let pixels = view.size.map(f64::from).iter().product::<f64>();
         let mut load = ModelLoad::default();
         for at in 0..self.near_to_far.len() {
-            let node = tree.node(self.near_to_far[at].1);
-            let (under, shaded) = match view.frustum.rectangle(node.bbox) {
+            let number = self.near_to_far[at].1;
+            let drawn = match face(number) {
+                Some(face) => Drawn::of_face(face, view),
+                None => Drawn::of_node(tree.node(number)),
+            };
+            let (under, shaded) = match view.frustum.rectangle(drawn.bbox) {
                 Some(rectangle) => self.cover(rectangle),
                 None => (0.0, 0.0),
             };
-            let (under, shaded) = (under * pixels, shaded * pixels);
-            let triangles = f64::from(node.triangles);
-            let textured = f64::from(node.textured_triangles) / triangles.max(1.0);
-            load.draws += f64::from(node.draws);
-            load.vertices += f64::from(node.vertices);
-            load.triangles += triangles;
-            load.textured_fragments += shaded * textured;
-            load.plain_fragments += shaded * (1.0 - textured);
+            let (under, shaded) = (under * pixels * drawn.filled, shaded * pixels * drawn.filled);
+            load.draws += drawn.draws;
+            load.vertices += drawn.vertices;
+            load.triangles += drawn.triangles;
+            load.textured_fragments += shaded * drawn.textured;
+            load.plain_fragments += shaded * (1.0 - drawn.textured);
             load.hidden_fragments += under - shaded;
             // Triangles of a pixel have an edge of a pixel; smaller ones are not drawn.
-            load.edge_fragments += (under * triangles.min(under)).sqrt();
+            load.edge_fragments += (under * drawn.triangles.min(under)).sqrt();
         }
         load
     }
@@ -123,7 +184,7 @@ mod tests {
         let tree = tree(vec![at(11.0, -4.0), at(11.0, 4.0), at(21.0, 8.0)]);
         let view = view();
         let mut loads = TileLoad::default();
-        let of = |loads: &mut TileLoad, front: &[u32]| loads.of(&tree, front, &view);
+        let of = |loads: &mut TileLoad, front: &[u32]| loads.of(&tree, &[], front, &view);
         let [one, pair] = [&[0][..], &[0, 1]].map(|front| of(&mut loads, front));
         assert!((pair.plain_fragments - 2.0 * one.plain_fragments).abs() < 1e-9);
         assert!(pair.hidden_fragments < 1e-9);
@@ -135,7 +196,7 @@ mod tests {
     fn what_is_shaded_and_hidden_is_all_that_is_under_boxes() {
         let wall = |x: f64| Sketch { size: 100.0, ..sketch([x, 0.0, 0.0], 1.0, vec![]) };
         let tree = tree(vec![wall(51.0), wall(160.0)]);
-        let load = TileLoad::default().of(&tree, &[1, 0], &view());
+        let load = TileLoad::default().of(&tree, &[], &[1, 0], &view());
         assert!((load.plain_fragments - 1e4).abs() < 1e-6, "{load:?}");
         let far = view().frustum.covered(tree.node(1).bbox) * 1e4;
         assert!((load.hidden_fragments - far).abs() < 1e-6, "{load:?}");

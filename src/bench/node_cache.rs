@@ -35,12 +35,12 @@ impl<R: BorrowMut<Renderer>> NodeCache<R> {
     /// An empty one, to hold at most `cap_bytes`, or what is wanted at once where that is more.
     pub fn new(tree: SceneTree, files: NodeFiles, renderer: R, cap_bytes: u64) -> Self {
         let format = files.texture_format();
+        let held = |vertices: u32, triangles: u32, own: &[[u32; 2]]| {
+            held_bytes(vertices, triangles, own, format)
+        };
         Self {
-            sizes: Sizes::new(
-                files.scene(),
-                |vertices, triangles, own| held_bytes(vertices, triangles, own, format),
-                |size| picture_bytes(size, format),
-            ),
+            sizes: Sizes::new(files.scene(), held, |size| picture_bytes(size, format))
+                .with_faces(files.faces(), held),
             tree,
             files,
             renderer,
@@ -178,7 +178,8 @@ impl<R: BorrowMut<Renderer>> NodeCache<R> {
         if size.textures.iter().any(|texture| !self.textures.contains_key(texture)) {
             return Ok(false);
         }
-        let level = self.tree.node(node).level;
+        let is_node = (node as usize) < self.tree.len();
+        let level = if is_node { self.tree.node(node).level } else { 0 };
         self.renderer.borrow_mut().upload(node, level, content)?;
         if self.held.insert(node, self.wants).is_none() {
             for texture in &size.textures {

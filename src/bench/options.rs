@@ -25,6 +25,10 @@ pub struct BenchOptions {
     pub warm_up_frames: u64,
     /// Whether what is hidden by what is before it is left out.
     pub cull_hidden: bool,
+    /// Whether what is far is drawn from the faces of cells, where the eye is in one.
+    // Left away where it is not so, so that summaries of before can be compared.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub far_field: bool,
     /// How textures are stored, as far as they [can be](TextureFormat::of_picture); memory is counted
     /// so, drawn or not. RGBA8.
     pub textures: TextureFormat,
@@ -42,6 +46,7 @@ impl Default for BenchOptions {
             size: Size::default(),
             warm_up_frames: 0,
             cull_hidden: true,
+            far_field: false,
             textures: TextureFormat::Rgba8,
             seed: 0,
         }

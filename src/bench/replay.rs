@@ -6,6 +6,7 @@ use super::{BenchOptions, FrameInspector, FrameRecord, FrameSample, Pace};
 use crate::Result;
 use crate::camera::{CameraPath, View};
 use crate::engine::{Backend, CostModel, Engine, Occluders, Policy};
+use crate::format::cells::Cells;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::Residency;
 
@@ -25,6 +26,8 @@ pub struct Replay<'a> {
     pub costs: CostModel,
     /// What hides what, where that is to be known.
     pub occluders: Option<Arc<Occluders>>,
+    /// What is drawn of what is far, where cells are.
+    pub cells: Option<Arc<Cells>>,
     /// Who inspects its frames, or nobody.
     pub inspector: Option<&'a mut dyn FrameInspector>,
     /// What else determines it.
@@ -45,11 +48,24 @@ pub struct Run {
 /// Replays a path; `progress` is told of each frame that is done and ends the run where it says
 /// false.
 pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -> Result<Run> {
-    let Replay { tree, path, policy, residency, backend, costs, occluders, mut inspector, options } =
-        replay;
+    let Replay {
+        tree,
+        path,
+        policy,
+        residency,
+        backend,
+        costs,
+        occluders,
+        cells,
+        mut inspector,
+        options,
+    } = replay;
     let mut engine = Engine::start(tree, policy, residency, backend, costs, options.target_ms)?;
     if let Some(occluders) = occluders {
         engine.look_past(occluders);
+    }
+    if let Some(cells) = cells {
+        engine.draw_far_from(cells);
     }
     if options.cull_hidden {
         engine.cull_hidden(tree.near_plane().into());
@@ -80,10 +96,21 @@ pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -
         if let Some(inspector) = inspector.as_mut().filter(|at| at.wants(index, toggled)) {
             let (front, before) = (engine.drawn().to_vec(), engine.front_before().to_vec());
             let hidden = engine.hidden();
+            let (faces, cull_box) = (engine.faces().to_vec(), engine.cull_box());
+            let faces = &faces[..];
             let (front, before) = (&front[..], toggled.then_some(&before[..]));
             engine.inspect(&view, &mut |drawn| {
                 let (frame, hidden) = (record.frame, &hidden[..]);
-                let sample = FrameSample { frame, view: &view, front, hidden, before, drawn };
+                let sample = FrameSample {
+                    frame,
+                    view: &view,
+                    front,
+                    faces,
+                    cull_box,
+                    hidden,
+                    before,
+                    drawn,
+                };
                 record.accuracy = Some(inspector.inspect(sample)?);
                 Ok(())
             })?;

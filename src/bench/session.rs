@@ -7,14 +7,15 @@ use super::{
     BenchOptions, ClockConstants, Context, FrameInspector, FrameRecord, ModelBackend,
     ModelOcclusions, Replay, Run, run,
 };
-use crate::Result;
 use crate::camera::CameraPath;
 use crate::engine::{CostModel, NodeOcclusion, Occluders, Policy};
 use crate::format::Scene;
+use crate::format::cells::{CELLS_FILE, Cells};
 use crate::loading::NodeFiles;
 use crate::render::content::{TextureFormat, held_bytes, picture_bytes};
 use crate::runtime::SceneTree;
 use crate::runtime::residency::{Residency, Sizes};
+use crate::{Error, Result};
 
 /// A built scene that is open for runs.
 #[derive(Clone, Debug)]
@@ -26,6 +27,7 @@ pub struct Session {
     occluders: OnceLock<Arc<Occluders>>,
     /// For runs in which nothing is drawn.
     occlusions: Arc<ModelOcclusions>,
+    cells: Option<Arc<Cells>>,
 }
 
 impl Session {
@@ -34,7 +36,19 @@ impl Session {
         let scene = Arc::new(Scene::read(dir)?.breadth_first());
         let tree = SceneTree::new(&scene);
         let occlusions = Arc::new(ModelOcclusions::new(NodeFiles::new(dir, Arc::clone(&scene))));
-        Ok(Self { dir: dir.to_owned(), scene, tree, occluders: OnceLock::new(), occlusions })
+        let (dir, occluders) = (dir.to_owned(), OnceLock::new());
+        Ok(Self { dir, scene, tree, occluders, occlusions, cells: None })
+    }
+
+    /// The same with the cells that `hlod-build cells` made of it; fails where there are none, or those of
+    /// another build.
+    pub fn with_cells(self) -> Result<Self> {
+        let Some(cells) = Cells::read(&self.dir)? else {
+            let what = "there are no cells; make some with `hlod-build cells`";
+            return Err(Error::input(self.dir.join(CELLS_FILE), what));
+        };
+        cells.check_scene(&self.scene, &self.dir)?;
+        Ok(Self { cells: Some(Arc::new(cells)), ..self })
     }
 
     /// The scene.
@@ -47,9 +61,13 @@ impl Session {
         &self.tree
     }
 
-    /// The files of the scene.
+    /// The files of the scene, and of its cells where they were read.
     pub fn files(&self) -> NodeFiles {
-        NodeFiles::new(&self.dir, Arc::clone(&self.scene))
+        let files = NodeFiles::new(&self.dir, Arc::clone(&self.scene));
+        match &self.cells {
+            Some(cells) => files.with_faces(cells),
+            None => files,
+        }
     }
 
     /// The hierarchy with the costs of a machine.
@@ -83,6 +101,7 @@ impl Session {
         &self,
         options: &BenchOptions,
         policy: &dyn Policy,
+        cells: Option<&Cells>,
     ) -> Result<Arc<Mutex<Residency>>> {
         let occlusion = |node: u32| {
             let at = self.tree.node(node);
@@ -95,8 +114,22 @@ impl Session {
                 _ => hides,
             }
         };
-        let sizes = self.sizes(options.textures).with_beside(occlusion);
+        let mut sizes = self.sizes(options.textures).with_beside(occlusion);
+        if let Some(cells) = cells {
+            sizes = sizes.with_faces(&cells.faces, |vertices, triangles, own| {
+                held_bytes(vertices, triangles, own, options.textures)
+            });
+        }
         Ok(Arc::new(Mutex::new(Residency::new(&self.tree, sizes, options.residency)?)))
+    }
+
+    /// Its cells, where what is far is drawn from them.
+    fn cells_for(&self, options: &BenchOptions) -> Result<Option<Arc<Cells>>> {
+        match (options.far_field, &self.cells) {
+            (false, _) => Ok(None),
+            (true, Some(cells)) => Ok(Some(Arc::clone(cells))),
+            (true, None) => Err(Error::Internal("cells are wanted and were not read".into())),
+        }
     }
 
     /// The surfaces of the roots, for policies that ask what hides what. A file that cannot be used
@@ -143,13 +176,15 @@ impl Session {
         progress: impl FnMut(&FrameRecord) -> bool,
     ) -> Result<(Run, Context)> {
         options.check()?;
+        let cells = self.cells_for(&options)?;
         let mut policy = options.policy.make()?;
         let tree = self.tree_for(&constants);
         let context = Context { constants, ..self.context(options.clone(), path, &*policy) };
         let occluders = self.occluders(&*policy);
         let mut backend = ModelBackend::new(&tree, constants, options.seed)
-            .with_occlusions(Arc::clone(&self.occlusions));
-        let residency = self.residency(&options, &*policy)?;
+            .with_occlusions(Arc::clone(&self.occlusions))
+            .with_cells(cells.clone());
+        let residency = self.residency(&options, &*policy, cells.as_deref())?;
         let replay = Replay {
             tree: &tree,
             path,
@@ -158,6 +193,7 @@ impl Session {
             backend: &mut backend,
             costs: CostModel::new(&constants.prices),
             occluders,
+            cells: cells.clone(),
             inspector: match inspector {
                 Some(inspector) => Some(inspector), // for as long as this run
                 None => None,
@@ -182,10 +218,11 @@ impl Session {
         progress: impl FnMut(&FrameRecord) -> bool,
     ) -> Result<(Run, Context)> {
         options.check()?;
+        let cells = self.cells_for(&options)?;
         renderer.check_textures(options.textures)?;
         // Roots that do not fit are told of before anything is loaded.
         let mut policy = options.policy.make()?;
-        let residency = self.residency(&options, &*policy)?;
+        let residency = self.residency(&options, &*policy, cells.as_deref())?;
         let files = self.files().with_textures(options.textures);
         let weight = constants.unwrap_or_default();
         let tree = self.tree_for(&weight);
@@ -221,6 +258,7 @@ impl Session {
             backend: &mut backend,
             costs: CostModel::new(&constants.prices),
             occluders,
+            cells: cells.clone(),
             inspector: match inspector {
                 Some(inspector) => Some(inspector), // for as long as this run
                 None => None,

@@ -145,6 +145,12 @@ pub fn summary(run: &Run, context: &Context) -> Value {
             "nodes_mean": mean(of(|frame| f64::from(frame.report.hidden_nodes))),
             "triangles_mean": mean(of(|frame| frame.report.hidden_triangles as f64)),
         },
+        // In the place of nodes outside of cull boxes.
+        "far_field": {
+            "frames_percent": mean(of(|frame| f64::from(u8::from(frame.report.faces > 0)))) * 100.0,
+            "faces_mean": mean(of(|frame| f64::from(frame.report.faces))),
+            "triangles_mean": mean(of(|frame| frame.report.face_triangles as f64)),
+        },
         "visited_mean": mean(of(|frame| f64::from(frame.report.visited))),
         "nodes_mean": mean(of(|frame| f64::from(frame.report.nodes))),
         "triangles_mean": mean(of(|frame| frame.report.triangles as f64)),
@@ -301,6 +307,17 @@ pub fn summary_text(summary: &Value) -> String {
             number("/select_ms/mean")
         ),
     );
+    if number("/far_field/faces_mean") > 0.0 {
+        line(
+            "far field",
+            format!(
+                "{:.1} faces and {:.0} triangles a frame, in {:.0} % of frames",
+                number("/far_field/faces_mean"),
+                number("/far_field/triangles_mean"),
+                number("/far_field/frames_percent"),
+            ),
+        );
+    }
     if number("/hidden/nodes_mean") > 0.0 {
         let hidden = number("/hidden/triangles_mean");
         line(

@@ -13,6 +13,7 @@ use hlod::builder::progress::Progress;
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::builder::threads::with_threads;
 use hlod::builder::{BuildOptions, Outcome, build};
+use hlod::cells::CellOptions;
 use hlod::format::Scene;
 use hlod::mesh::UpAxis;
 use hlod::place::{Place, Placement};
@@ -37,8 +38,8 @@ const NOT_HELD: u8 = 3;
     version,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    override_usage = "hlod-build [OPTIONS] INPUT... OUT\n       hlod-build inspect [--json] OUT\n       hlod-build verify [--json] [--source MODEL]... OUT",
-    after_help = "Examples:\n  hlod-build city.obj out/\n  hlod-build --blocks grid:200 tiles/ more.glb out/\n  hlod-build inspect out/\n  hlod-build verify out/ --source city.obj\n\nExit codes: 0 success, 1 internal error, 2 usage, 3 input missing or invalid, or what verify looked at does not hold, 4 output not written."
+    override_usage = "hlod-build [OPTIONS] INPUT... OUT\n       hlod-build inspect [--json] OUT\n       hlod-build verify [--json] [--source MODEL]... OUT\n       hlod-build cells [OPTIONS] OUT",
+    after_help = "Examples:\n  hlod-build city.obj out/\n  hlod-build --blocks grid:200 tiles/ more.glb out/\n  hlod-build inspect out/\n  hlod-build verify out/ --source city.obj\n  hlod-build cells out/ --along walk.csv\n\nExit codes: 0 success, 1 internal error, 2 usage, 3 input missing or invalid, or what verify looked at does not hold, 4 output not written, 5 no graphics adapter (cells)."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -63,6 +64,50 @@ enum Command {
     /// Checks a built hierarchy against its source: files, attributes, distances, gaps, colours.
     /// Ends in pass or, with exit code 3, in fail
     Verify(VerifyArgs),
+    /// Prepares cells where viewers are: what is far from each is drawn from textured depth meshes
+    /// (`hlod-bench --far-field cells`). Writes OUT/cells.hlod (index) and OUT/cells/*.glb; goes on where an
+    /// earlier run was stopped. Needs a graphics adapter, or Mesa's lavapipe (Debian: mesa-vulkan-drivers)
+    Cells(CellsArgs),
+}
+
+#[derive(Args, Debug)]
+struct CellsArgs {
+    /// The output folder of an earlier build
+    out: PathBuf,
+    /// Make the cells that these camera paths pass through [default: along all streets and squares, at eye
+    /// height]
+    #[arg(long, value_name = "PATH.csv", num_args = 1..)]
+    along: Vec<PathBuf>,
+    /// Make cells of this size over all of the scene, above 0
+    #[arg(long, value_name = "METRES", requires = "height", conflicts_with_all = ["along", "cell"])]
+    grid: Option<f64>,
+    /// Metres above the ground at which those of --grid are
+    #[arg(long, value_name = "METRES", requires = "grid", allow_negative_numbers = true)]
+    height: Option<f64>,
+    /// Side of a cell, metres, above 0. Larger: fewer cells, and more that is seen from elsewhere in them
+    #[arg(long, value_name = "METRES", default_value_t = CellOptions::default().cell_m)]
+    cell: f64,
+    /// Metres from a cell to the sides of its cull box, above 0: what is farther is drawn from its faces
+    #[arg(long, value_name = "METRES", default_value_t = CellOptions::default().cull_m)]
+    cull: f64,
+    /// Pixels along the side of a face, 16-8192
+    #[arg(long, value_name = "N", default_value_t = CellOptions::default().pixels)]
+    pixels: u32,
+    /// Pixels of a face by which what it shows may be off, seen from anywhere in the cell; above 0
+    #[arg(long, value_name = "PIXELS", default_value_t = CellOptions::default().error_px)]
+    error: f64,
+    /// JPEG quality of the faces, 1-100
+    #[arg(long, value_name = "Q", default_value_t = CellOptions::default().jpeg_quality)]
+    jpeg_quality: u8,
+    /// Graphics adapter: part of its name, or its number [default: the fastest kind there is]
+    #[arg(long, value_name = "ADAPTER")]
+    adapter: Option<String>,
+    /// Threads, 0-1024; 0 is one for each core
+    #[arg(long, short = 'j', value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    quiet: bool,
 }
 
 #[derive(Args, Debug)]
@@ -343,6 +388,7 @@ fn main() -> ExitCode {
     let done = match cli.command {
         Some(Command::Inspect { out, json, blocks }) => inspect_scene(&out, json, blocks),
         Some(Command::Verify(arguments)) => return verify_scene(&arguments),
+        Some(Command::Cells(arguments)) => cells(&arguments),
         None => run(&cli.build),
     };
     exit_code(done.map(|()| ExitCode::SUCCESS))
@@ -383,6 +429,106 @@ fn inspect_scene(out: &Path, json: bool, blocks: usize) -> Result<()> {
     } else {
         inspect::text(&scene, blocks)
     })
+}
+
+/// Makes cells where eyes may be.
+#[cfg(feature = "render")]
+fn cells(arguments: &CellsArgs) -> Result<()> {
+    use hlod::cells::prepare;
+    let options = arguments.options();
+    options.check()?;
+    let places = places(arguments, &options)?;
+    let bar = CellBar(bar(arguments.quiet, "{msg:24} {wide_bar} {pos}/{len}  {eta} left"));
+    let prepared = with_threads(arguments.threads, || {
+        prepare(&arguments.out, &places, &options, arguments.adapter.as_deref(), &bar)
+    });
+    bar.0.finish_and_clear();
+    let prepared = prepared??;
+    if let Some(first) = prepared.broken.first() {
+        let what = format!(
+            "{} files cannot be used; build again. The first: {first}",
+            prepared.broken.len()
+        );
+        return Err(Error::input(&arguments.out, what));
+    }
+    if arguments.quiet {
+        return Ok(());
+    }
+    let faces = prepared.faces.max(1) as u64;
+    print(&format!(
+        "{} cells, {} of them from earlier; {} faces: {} triangles and {} bytes each on average\n",
+        prepared.cells,
+        prepared.known,
+        prepared.faces,
+        prepared.triangles / faces,
+        prepared.bytes / faces,
+    ))
+}
+
+/// The cells that are asked for.
+#[cfg(feature = "render")]
+fn places(arguments: &CellsArgs, options: &CellOptions) -> Result<Vec<[i64; 3]>> {
+    use hlod::camera::{Ground, eyes_over, read_path, street_eyes};
+    use hlod::cells::{along, around};
+    let scene = Scene::read(&arguments.out)?;
+    let ground = || Ground::read(&scene, &arguments.out);
+    match (arguments.height, &arguments.along[..]) {
+        (Some(height), _) if !height.is_finite() => {
+            Err(Error::Usage(format!("--height: expected metres, found {height}")))
+        }
+        (Some(height), _) => {
+            Ok(around(eyes_over(&ground()?, options.cell_m, height), options.cell_m))
+        }
+        (None, []) => {
+            let places = around(street_eyes(&ground()?), options.cell_m);
+            let none = "there is no room to walk in; give paths with --along, or a --height";
+            if places.is_empty() { Err(Error::input(&arguments.out, none)) } else { Ok(places) }
+        }
+        (None, paths) => {
+            let mut places = Vec::new();
+            for path in paths {
+                places.extend(along(&read_path(path, scene.up)?, options.cell_m));
+            }
+            Ok(places)
+        }
+    }
+}
+
+#[cfg(not(feature = "render"))]
+fn cells(_: &CellsArgs) -> Result<()> {
+    Err(Error::NoAdapter(
+        "cells are drawn, and this program was built without the feature `render`".into(),
+    ))
+}
+
+impl CellsArgs {
+    #[cfg(feature = "render")]
+    fn options(&self) -> CellOptions {
+        CellOptions {
+            cell_m: self.grid.unwrap_or(self.cell),
+            cull_m: self.cull,
+            pixels: self.pixels,
+            error_px: self.error,
+            jpeg_quality: self.jpeg_quality,
+        }
+    }
+}
+
+/// Cells on a terminal; nothing elsewhere.
+#[cfg(feature = "render")]
+struct CellBar(ProgressBar);
+
+#[cfg(feature = "render")]
+impl hlod::cells::Progress for CellBar {
+    fn begin(&self, cells: usize, known: usize) {
+        self.0.set_length(cells as u64);
+        self.0.set_position(known as u64);
+        self.0.set_message("cells");
+    }
+
+    fn done(&self) {
+        self.0.inc(1);
+    }
 }
 
 fn verify_scene(arguments: &VerifyArgs) -> ExitCode {

@@ -17,6 +17,8 @@ pub struct Frustum {
     pub forward: DVec3,
     /// What a metre to the right, and a metre up, at a depth of 1 m is of half the picture.
     across: [DVec3; 2],
+    /// Least and greatest corner of a box outside of which nothing is seen either.
+    within: Option<[DVec3; 2]>,
 }
 
 impl Frustum {
@@ -38,7 +40,18 @@ impl Frustum {
             sides: [0, 1, 2].map(|axis| sides.map(|side| side[axis])),
             forward,
             across: [right / half_width, up / half_height],
+            within: None,
         }
+    }
+
+    /// The same where nothing is seen outside of a box; without a box, as far as the pyramid goes.
+    pub fn within(self, within: Option<[DVec3; 2]>) -> Self {
+        Self { within, ..self }
+    }
+
+    /// The box outside of which nothing is seen.
+    pub fn box_within(&self) -> Option<[DVec3; 2]> {
+        self.within
     }
 
     /// What a metre to the right, and a metre up, at a depth of 1 m is of half the picture.
@@ -61,7 +74,14 @@ impl Frustum {
             let reach = half.x * x[side].abs() + half.y * y[side].abs() + half.z * z[side].abs();
             -(at + reach)
         });
-        beyond.into_iter().fold(behind.max(0.0), |most, by| if by > most { by } else { most })
+        let out =
+            beyond.into_iter().fold(behind.max(0.0), |most, by| if by > most { by } else { most });
+        match self.within {
+            None => out,
+            Some([min, max]) => {
+                (min - bbox[1]).max_element().max((bbox[0] - max).max_element()).max(out)
+            }
+        }
     }
 
     /// The part of the picture, 0 to 1, under the smallest upright rectangle around what is seen

@@ -5,6 +5,7 @@
 
 mod aerial;
 mod circuit;
+mod eyes;
 mod fly;
 mod ground;
 mod look;
@@ -30,6 +31,7 @@ use glam::DVec3;
 use super::{CameraPath, DEFAULT_FOV_Y_DEG, PathFrame, Pose, from_angles};
 use crate::{Error, Result};
 
+pub use eyes::{eyes_over, street_eyes};
 pub use ground::Ground;
 pub use stand::{SHAKE_PERIOD_S, SHAKE_SWAY_M, SHAKE_TURN_DEG};
 pub use travel::{MAX_DRIVING_TURN_DEG_S, MAX_TURN_DEG_S};

@@ -17,7 +17,7 @@ pub use csv::{DEFAULT_FOV_Y_DEG, format_path, parse_path, read_path, write_path}
 pub use frustum::Frustum;
 pub use make::{
     DEFAULT_FPS, DRIVE_M_S, Ground, MAX_TURN_DEG_S, PathKind, SHAKE_PERIOD_S, SHAKE_SWAY_M,
-    SHAKE_TURN_DEG, WALK_M_S, make_path,
+    SHAKE_TURN_DEG, WALK_M_S, eyes_over, make_path, street_eyes,
 };
 pub use path::{CameraPath, PathFrame};
 pub use pose::Pose;

@@ -7,6 +7,8 @@
 //! factor of the next. Where the graphics card has a clock of its own, what it takes and what the
 //! processor takes beside it are fitted apart.
 
+use std::ops::AddAssign;
+
 use serde::{Deserialize, Serialize};
 
 use super::host_time::HostTime;
@@ -53,6 +55,18 @@ pub struct Load {
     pub hidden_fragments: f64,
     /// Bytes uploaded.
     pub uploaded_bytes: f64,
+}
+
+impl AddAssign for Load {
+    fn add_assign(&mut self, more: Self) {
+        self.draws += more.draws;
+        self.vertices += more.vertices;
+        self.triangles += more.triangles;
+        self.plain_fragments += more.plain_fragments;
+        self.textured_fragments += more.textured_fragments;
+        self.hidden_fragments += more.hidden_fragments;
+        self.uploaded_bytes += more.uploaded_bytes;
+    }
 }
 
 /// The terms of what the processor takes: the frame, draw calls, bytes uploaded.

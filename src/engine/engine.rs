@@ -2,16 +2,19 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use glam::DVec3;
+
 use super::margin::Margin;
 use super::predict::predict;
 use super::settling::Settling;
 use super::steady::Steady;
 use super::{
-    Backend, CostModel, FrameEstimate, FrameInput, FrameOutcome, FrameReport, FrontCheck,
+    Backend, CostModel, FarField, FrameEstimate, FrameInput, FrameOutcome, FrameReport, FrontCheck,
     FrontLoad, HiddenNodes, Inspect, Load, Occluders, Policy, PredictedView, Residents, SeenAreas,
     Selection, ToggleCauses, Visibility,
 };
 use crate::camera::{Pose, View};
+use crate::format::cells::Cells;
 use crate::runtime::residency::{Changes, Counters, MemoryUse, Residency};
 use crate::runtime::{SceneTree, ToggleCounter};
 use crate::{Error, Result};
@@ -35,6 +38,8 @@ struct Seen<'a> {
     memory: MemoryUse,
     steady: Steady,
     target_ms: f64,
+    /// What the far field takes of the frame, milliseconds.
+    far_ms: f64,
     /// Seconds since the frame before began.
     dt_s: f64,
 }
@@ -51,8 +56,8 @@ impl Seen<'_> {
             residents: &self.residents,
             memory: self.memory,
             costs: self.steady.costs(),
-            target_ms: self.target_ms,
-            budget_ms: self.steady.budget_ms(self.target_ms),
+            target_ms: (self.target_ms - self.far_ms).max(0.0),
+            budget_ms: (self.steady.budget_ms(self.target_ms) - self.far_ms).max(0.0),
             dt_s: self.dt_s,
         }
     }
@@ -68,8 +73,14 @@ pub struct Engine<'a> {
     margin: Margin,
     settling: Settling,
     front_load: FrontLoad,
+    far_field: Option<FarField>,
+    far_requests: Vec<(u32, f64)>,
+    /// The part of the picture that the nodes of the frame before covered, 0 to 1.
+    covered: f64,
     /// What the frame before drew, and took.
     drawn: Vec<u32>,
+    /// The same with the faces of the far field.
+    drawn_with_faces: Vec<u32>,
     load: Load,
     /// The camera of the frame before.
     pose: Option<Pose>,
@@ -120,6 +131,7 @@ impl<'a> Engine<'a> {
                 memory,
                 steady: Steady::new(&costs, margin.ratio()),
                 target_ms,
+                far_ms: 0.0,
                 dt_s: 0.0,
             },
             policy,
@@ -129,7 +141,11 @@ impl<'a> Engine<'a> {
             margin,
             settling: Settling::default(),
             front_load: FrontLoad::default(),
+            far_field: None,
+            far_requests: Vec::new(),
+            covered: 0.0,
             drawn: Vec::new(),
+            drawn_with_faces: Vec::new(),
             load: Load::default(),
             pose: None,
             selection: Selection::default(),
@@ -162,6 +178,14 @@ impl<'a> Engine<'a> {
         self.seen.hidden = Some(hidden);
     }
 
+    /// Draws what is far from the faces of cells. Residency must know of them:
+    /// [`Sizes::with_faces`](crate::runtime::residency::Sizes::with_faces).
+    pub fn draw_far_from(&mut self, cells: Arc<Cells>) {
+        let nodes = self.seen.tree.len();
+        self.seen.residents.grow(nodes + cells.faces.len());
+        self.far_field = Some(FarField::new(cells, nodes as u32));
+    }
+
     /// Draws a frame. The next begins `interval_s` seconds after this one began, at the earliest.
     /// A view that is not [finite](View::is_finite) is refused.
     pub fn frame(&mut self, view: &View, interval_s: f64) -> Result<FrameReport> {
@@ -180,6 +204,8 @@ impl<'a> Engine<'a> {
         self.hold_occlusion(&changes);
         let seen = &mut self.seen;
         predict(self.pose.as_ref(), view, seen.dt_s, &mut seen.predicted);
+        let view = &self.look_far(view);
+        let seen = &mut self.seen;
         seen.visibility.begin_frame(seen.tree.len());
         let is_still =
             changes.arrived.is_empty() && self.pose == Some(view.pose) && self.margin.is_known();
@@ -208,7 +234,11 @@ impl<'a> Engine<'a> {
         self.set_requests(view, &mut report)?;
         self.backend.priorities_set();
 
-        let drawn = self.backend.draw(&self.drawn, view)?;
+        self.drawn_with_faces.clone_from(&self.drawn);
+        if let Some(far_field) = &self.far_field {
+            self.drawn_with_faces.extend(far_field.drawn());
+        }
+        let drawn = self.backend.draw(&self.drawn_with_faces, view)?;
         (report.draw_ms, report.gpu_ms) = (drawn.draw_ms, drawn.gpu_ms);
         report.actual_ms = report.select_ms + report.draw_ms;
         report.frame_ms = report.actual_ms + report.upload_ms;
@@ -225,6 +255,18 @@ impl<'a> Engine<'a> {
         self.seen.dt_s = step_s.min(LONGEST_STEP_S);
         self.pose = Some(view.pose);
         Ok(report)
+    }
+
+    /// The view without what faces show of it, and as much of those that are expected.
+    fn look_far(&mut self, view: &View) -> View {
+        let Some(far_field) = &mut self.far_field else { return *view };
+        let seen = &mut self.seen;
+        far_field.look(view, &seen.residents);
+        for at in &mut seen.predicted {
+            *at = far_field.expected(at);
+        }
+        seen.far_ms = seen.steady.costs().added_ms(&far_field.load(view, self.covered));
+        view.within(far_field.cull_box())
     }
 
     /// Takes over what arrived and lets go of what left.
@@ -247,15 +289,24 @@ impl<'a> Engine<'a> {
     /// Knows what the nodes in memory hide, and of no others.
     fn hold_occlusion(&mut self, changes: &Changes) {
         let Some(hidden) = &mut self.seen.hidden else { return };
-        changes.left.iter().for_each(|&node| hidden.set(node, None));
-        changes.arrived.iter().for_each(|&node| hidden.set(node, self.backend.occlusion(node)));
+        // Faces hide nothing.
+        let nodes = self.seen.tree.len() as u32;
+        let left = changes.left.iter().filter(|&&node| node < nodes);
+        left.for_each(|&node| hidden.set(node, None));
+        let arrived = changes.arrived.iter().filter(|&&node| node < nodes);
+        arrived.for_each(|&node| hidden.set(node, self.backend.occlusion(node)));
     }
 
     /// Sets what was expected of a frame beside what it took, and learns from it.
     fn estimate(&mut self, view: &View, changes: &Changes, report: &mut FrameReport) {
         let (costs, &Seen { tree, target_ms, dt_s, ref steady, .. }) =
             (&mut self.costs, &self.seen);
-        let whole = self.front_load.of(tree, &self.drawn, view, changes.arrived_bytes);
+        let mut whole = self.front_load.of(tree, &self.drawn, view, changes.arrived_bytes);
+        let [width, height] = view.size.map(f64::from);
+        self.covered = (whole.plain_fragments + whole.textured_fragments) / (width * height);
+        if let Some(far_field) = &self.far_field {
+            whole += far_field.load(view, self.covered);
+        }
         let drawn = Load { uploaded_bytes: 0.0, ..whole };
         let modelled = costs.estimate(&whole);
         (report.modelled_ms, report.modelled_deviation_ms) =
@@ -286,6 +337,16 @@ impl<'a> Engine<'a> {
         &self.drawn
     }
 
+    /// Faces of cells that it drew.
+    pub fn faces(&self) -> &[u32] {
+        &self.drawn_with_faces[self.drawn.len()..]
+    }
+
+    /// The cull box at which the last frame cut its nodes, where faces show what is outside of it.
+    pub fn cull_box(&self) -> Option<[DVec3; 2]> {
+        self.far_field.as_ref()?.cull_box()
+    }
+
     /// Nodes of its front that it did not draw, since those drawn hide them.
     pub fn hidden(&self) -> Vec<u32> {
         // What is drawn is in the front's order.
@@ -301,7 +362,7 @@ impl<'a> Engine<'a> {
 
     /// Pauses loading while the last frame is inspected, with its image where there is one.
     pub fn inspect(&mut self, view: &View, inspect: &mut Inspect<'_>) -> Result<()> {
-        self.backend.pause_for(&self.drawn, view, inspect)
+        self.backend.pause_for(&self.drawn_with_faces, view, inspect)
     }
 
     /// Frame `frame` of a path was logged: a time for what must not be timed.
@@ -330,10 +391,21 @@ impl<'a> Engine<'a> {
         residency.stale(&mut self.stale);
         self.others.clear();
         let input = self.seen.from(view);
-        let utility = |&node: &u32| (node, self.policy.utility(&input, node));
+        let nodes = self.seen.tree.len() as u32;
+        let utility = |&node: &u32| match node < nodes {
+            true => (node, self.policy.utility(&input, node)),
+            // A face that is not wanted is of no use.
+            false => (node, 0.0),
+        };
         self.others.extend(self.stale.iter().map(utility));
         let Selection { front, requests, ahead, released, keep_visited, .. } = &self.selection;
         residency.set_priorities(requests, &self.others);
+        if let Some(far_field) = &self.far_field {
+            let most = requests.iter().fold(0.0, |most: f64, request| most.max(request.1));
+            self.far_requests.clear();
+            far_field.requests(view, &self.seen.predicted, most, &mut self.far_requests);
+            residency.set_faces(&self.far_requests);
+        }
         residency.set_ahead(ahead);
         residency.set_needed(front.iter().copied());
         if *keep_visited {
@@ -367,6 +439,10 @@ impl<'a> Engine<'a> {
         (report.toggles_up, report.toggles_down) = (toggles.up, toggles.down);
         let frame = self.seen.from(view);
         report.toggle_causes = ToggleCauses::of(&frame, &self.toggles, changes);
+        if let Some(far_field) = &self.far_field {
+            report.faces = far_field.drawn().len() as u32;
+            report.face_triangles = far_field.triangles();
+        }
         report.finer_resident = self.drawn.iter().any(|&node| frame.can_refine(node));
     }
 

@@ -9,6 +9,7 @@ mod check_front;
 mod cost_model;
 #[expect(clippy::module_inception)]
 mod engine;
+mod far_field;
 mod frame_load;
 mod host_time;
 pub(crate) mod least_squares;
@@ -30,6 +31,7 @@ pub use backend::{Backend, Drawn, Inspect};
 pub use check_front::{FrontCheck, FrontFault, FrontRule};
 pub use cost_model::{CostModel, Estimate, Load, Prices};
 pub use engine::{Engine, lock};
+pub use far_field::FarField;
 pub use frame_load::{FrontLoad, geometry_load};
 pub use occlusion::{HiddenNodes, NodeOcclusion, Occluders, SeenAreas};
 pub use policy::{FrameEstimate, FrameInput, FrameOutcome, Policy, PredictedView, Selection};

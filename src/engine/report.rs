@@ -43,6 +43,10 @@ pub struct FrameReport {
     pub hidden_nodes: u32,
     /// Triangles of these.
     pub hidden_triangles: u64,
+    /// Faces of cells drawn, in the place of nodes outside of a cull box.
+    pub faces: u32,
+    /// Triangles of these.
+    pub face_triangles: u64,
     /// Nodes visited by selection.
     pub visited: u32,
     /// Of these, nodes outside of the view.

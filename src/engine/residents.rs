@@ -18,6 +18,11 @@ impl Residents {
         Self { resident: vec![true; nodes], coming: Vec::new() }
     }
 
+    /// Makes room for so many.
+    pub fn grow(&mut self, nodes: usize) {
+        self.resident.resize(nodes, false);
+    }
+
     /// Whether a node can be drawn.
     pub fn contains(&self, node: u32) -> bool {
         self.resident.get(node as usize).copied().unwrap_or(false)

@@ -7,11 +7,14 @@
 //! out/tileset.json    the same for viewers that read 3D Tiles
 //! out/tilesets/*      regions of it, where the city is large
 //! out/build.json      what the build did, for people and scripts
+//! out/cells.hlod      cells in which viewers are, where such were prepared: Cells
+//! out/cells/*.glb     what is far from each of them, as pictures with depth
 //! ```
 
 pub mod attributes;
 mod breadth_first;
 mod bytes;
+pub mod cells;
 mod encoding;
 mod file_name;
 mod glb_packed;
@@ -31,6 +34,7 @@ mod scene_read;
 #[cfg(test)]
 mod scene_tests;
 mod scene_write;
+mod sink;
 #[cfg(test)]
 mod test_mesh;
 #[cfg(test)]

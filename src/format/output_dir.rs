@@ -12,6 +12,7 @@ use std::path::{Component, Path, PathBuf};
 
 use super::{
     NODES_DIR, REPORT_FILE, SCENE_FILE, SCENE_MAGIC, TEXTURES_DIR, TILESET_FILE, TILESETS_DIR,
+    cells::{CELLS_DIR, CELLS_FILE},
 };
 use crate::{Error, Result};
 
@@ -245,8 +246,8 @@ fn sorted_names(listing: fs::ReadDir) -> io::Result<Vec<OsString>> {
 fn first_foreign(target: &Path, names: &[OsString]) -> Option<PathBuf> {
     for name in names {
         let kinds: &[&str] = match name.to_str() {
-            Some(SCENE_FILE | REPORT_FILE | TILESET_FILE) => continue,
-            Some(NODES_DIR) => &["glb"],
+            Some(SCENE_FILE | REPORT_FILE | TILESET_FILE | CELLS_FILE) => continue,
+            Some(NODES_DIR | CELLS_DIR) => &["glb"],
             Some(TEXTURES_DIR) => &["jpg", "png"],
             Some(TILESETS_DIR) => &["json"],
             _ => return Some(name.into()),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::scene::Scene;
 use super::scene_check::{Element, SceneDefect};
-use super::scene_write::NONE;
+use super::sink::NONE;
 use super::test_scene::scene;
 use super::{SCENE_FILE, SCENE_VERSION};
 

@@ -20,6 +20,7 @@
 //! ```
 
 use super::scene::{Node, Scene};
+use super::sink::{NONE, Sink};
 use super::{SCENE_MAGIC, SCENE_VERSION};
 use crate::mesh::UpAxis;
 use crate::{Error, Result};
@@ -28,8 +29,6 @@ use crate::{Error, Result};
 pub(super) const FLAG_TEXTURED: u32 = 1;
 /// Set where Z is up, clear where Y is.
 pub(super) const FLAG_Z_UP: u32 = 2;
-/// Stands for an absent index.
-pub(super) const NONE: u32 = u32::MAX;
 /// Where the length of the file stands.
 const LENGTH_AT: usize = 16;
 
@@ -80,35 +79,7 @@ impl Scene {
     }
 }
 
-struct Sink(Vec<u8>);
-
 impl Sink {
-    fn u32(&mut self, value: u32) {
-        self.0.extend(value.to_le_bytes());
-    }
-
-    fn u64(&mut self, value: u64) {
-        self.0.extend(value.to_le_bytes());
-    }
-
-    fn f64s(&mut self, values: &[f64]) {
-        values.iter().for_each(|value| self.0.extend(value.to_le_bytes()));
-    }
-
-    fn count(&mut self, count: usize) -> Result<()> {
-        match u32::try_from(count) {
-            Ok(count) if count != NONE => self.u32(count),
-            _ => return Err(Error::Internal(format!("{count} entries in one table of a scene"))),
-        }
-        Ok(())
-    }
-
-    fn text(&mut self, text: &str) -> Result<()> {
-        self.count(text.len())?;
-        self.0.extend(text.as_bytes());
-        Ok(())
-    }
-
     fn node(&mut self, node: &Node) -> Result<()> {
         self.u64(node.id);
         for link in [node.parent, node.first_child, node.next_sibling] {

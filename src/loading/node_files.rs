@@ -9,8 +9,9 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::engine::NodeOcclusion;
+use crate::format::cells::{CELLS_DIR, Cells, Face};
 use crate::format::{NODES_DIR, NodeMesh, Scene, TEXTURES_DIR, file_crc, read_glb};
-use crate::render::content::{Content, Picture, TextureFormat};
+use crate::render::content::{Content, DrawPicture, Picture, TextureFormat};
 use crate::{Error, Result};
 
 /// The files of a built scene.
@@ -19,6 +20,8 @@ pub struct NodeFiles {
     dir: PathBuf,
     scene: Arc<Scene>,
     textures: FxHashMap<String, u32>,
+    /// Of cells, in the order of their numbers.
+    faces: Arc<[Face]>,
     with_occlusion: bool,
     format: TextureFormat,
 }
@@ -61,9 +64,26 @@ impl NodeFiles {
             dir: dir.to_owned(),
             scene,
             textures,
+            faces: Arc::new([]),
             with_occlusion: false,
             format: TextureFormat::Rgba8,
         }
+    }
+
+    /// Reads the faces of cells as well, whose numbers come after those of nodes.
+    pub fn with_faces(self, cells: &Cells) -> Self {
+        Self { faces: cells.faces.clone().into(), ..self }
+    }
+
+    /// The faces that it reads as well.
+    pub fn faces(&self) -> &[Face] {
+        &self.faces
+    }
+
+    /// The face that a number is of, unless it is of a node.
+    fn face(&self, number: u32) -> Option<&Face> {
+        let at = (number as usize).checked_sub(self.scene.nodes.len())?;
+        self.faces.get(at)
     }
 
     /// Has nodes arrive with what they hide.
@@ -89,6 +109,10 @@ impl NodeFiles {
     /// Begins to read a node and the shared pictures that it needs of which `held` says that they
     /// are not in memory.
     pub fn begin(&self, node: u32, held: impl Fn(u32) -> bool) -> Reading {
+        if let Some(face) = self.face(node) {
+            let files = vec![(self.dir.join(CELLS_DIR).join(&face.file), face.file_bytes)];
+            return Reading { node, files, textures: Vec::new(), open: None, bytes: Vec::new() };
+        }
         let entry = &self.scene.nodes[node as usize];
         let mut textures = entry.shared_textures.clone();
         textures.sort_unstable();
@@ -111,6 +135,9 @@ impl NodeFiles {
     fn decode(&self, reading: Reading) -> Result<Arrival> {
         let Reading { node, files, textures, bytes, .. } = reading;
         let (path, _) = &files[0];
+        if let Some(face) = self.face(node) {
+            return self.decode_face(node, face, path, &bytes);
+        }
         let (glb, mut rest) = self.checked(node, path, &bytes)?;
         let content = Content::decode(path, glb, |name| self.textures.get(name).copied())?
             .stored_as(self.format);
@@ -130,21 +157,27 @@ impl NodeFiles {
         Ok(Arrival { node, content, pictures, occlusion })
     }
 
+    /// Pictures of a face are projected from where they were taken.
+    fn decode_face(&self, number: u32, face: &Face, path: &Path, bytes: &[u8]) -> Result<Arrival> {
+        let (glb, _) = checked(face.file_bytes, face.file_crc, path, bytes)?;
+        let mut content = Content::decode(path, glb, |_| None)?.stored_as(self.format);
+        let sizes = face.views.iter().map(|view| view.size);
+        let found = content.pictures.iter().map(|picture| [picture.width(), picture.height()]);
+        if !found.eq(sizes) {
+            return Err(Error::input(path, "expected the pictures that the index of cells names"));
+        }
+        for draw in &mut content.draws {
+            if let DrawPicture::Own(own) = draw.picture {
+                draw.projection = Some(face.views[own as usize].projection);
+            }
+        }
+        Ok(Arrival { node: number, content, pictures: Vec::new(), occlusion: None })
+    }
+
     /// The bytes of a node's file, checked, and those after it.
     fn checked<'a>(&self, node: u32, path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], &'a [u8])> {
         let entry = &self.scene.nodes[node as usize];
-        let size = entry.file_bytes;
-        let (glb, rest) = bytes.split_at_checked(size as usize).ok_or_else(|| {
-            Error::input(path, format!("expected {size} bytes, found {}", bytes.len()))
-        })?;
-        let found = file_crc(glb);
-        if found != entry.file_crc {
-            return Err(Error::input(
-                path,
-                format!("damaged: expected CRC-32 {:08x}, found {found:08x}", entry.file_crc),
-            ));
-        }
-        Ok((glb, rest))
+        checked(entry.file_bytes, entry.file_crc, path, bytes)
     }
 
     /// Reads the geometry of a node alone: its pictures stay encoded.
@@ -174,6 +207,19 @@ impl NodeFiles {
         reading.read(bytes)?;
         self.finish(reading)
     }
+}
+
+/// The bytes of a file of a size, whose checksum is right, and those after it.
+fn checked<'a>(size: u64, crc: u32, path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], &'a [u8])> {
+    let (file, rest) = bytes.split_at_checked(size as usize).ok_or_else(|| {
+        Error::input(path, format!("expected {size} bytes, found {}", bytes.len()))
+    })?;
+    let found = file_crc(file);
+    if found != crc {
+        let what = format!("damaged: expected CRC-32 {crc:08x}, found {found:08x}");
+        return Err(Error::input(path, what));
+    }
+    Ok((file, rest))
 }
 
 /// Turns a panic into an error that names the file.

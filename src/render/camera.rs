@@ -1,6 +1,6 @@
 //! The camera as the shaders read it.
 
-use glam::{DMat4, DVec4};
+use glam::{DMat4, DVec3, DVec4};
 
 use crate::camera::Pose;
 
@@ -14,12 +14,15 @@ pub(super) struct Camera {
     metres_per_pixel: [f32; 2],
     /// The same, at the picture's upper left corner.
     corner: [f32; 2],
+    /// Two corners of a box, metres from the eye; a fourth number is room that the shaders leave.
+    box_corners: [[f32; 4]; 2],
 }
 
 impl Camera {
     /// Depth is `near / distance`: 1 at the near plane and 0 infinitely far away. In floating
     /// point this is as precise far away as it is near, so that no far plane is needed.
-    pub fn new(pose: &Pose, size: [u32; 2], near: f32) -> Self {
+    /// `cut` are two corners of the box at which nodes are cut, where they are.
+    pub fn new(pose: &Pose, size: [u32; 2], near: f32, cut: Option<[DVec3; 2]>) -> Self {
         let [width, height] = size.map(f64::from);
         let fov_y = pose.fov_y_deg.to_radians();
         let turn = DMat4::from_quat(pose.rotation.inverse());
@@ -36,6 +39,9 @@ impl Camera {
             metres_per_pixel: [half_width * 2.0 / width, half_height * 2.0 / height]
                 .map(|metres| metres as f32),
             corner: [-half_width, -half_height].map(|metres| metres as f32),
+            box_corners: cut
+                .unwrap_or_default()
+                .map(|corner| (corner - pose.position).as_vec3().extend(0.0).to_array()),
         }
     }
 }

@@ -18,6 +18,8 @@ pub(super) struct GpuNode {
     pub origin: DVec3,
     /// The middle of its vertices, in source coordinates.
     pub centre: DVec3,
+    /// Half the size of the box around them.
+    pub half: DVec3,
     pub level: u32,
     pub vertices: Buffer,
     pub indices: Buffer,
@@ -34,6 +36,7 @@ pub(super) struct GpuDraw {
     pub alpha: Alpha,
     pub picture: DrawPicture,
     pub wrap: [Wrap; 2],
+    pub projection: Option<[f32; 4]>,
 }
 
 impl GpuNode {
@@ -61,7 +64,7 @@ impl GpuNode {
         let mut draws: Vec<GpuDraw> = Vec::with_capacity(content.draws.len());
         for draw in &content.draws {
             let pipeline = PipelineKey::of(draw, options);
-            pipelines.prepare(device, pipeline);
+            pipeline.and_cut(options).for_each(|key| pipelines.prepare(device, key));
             if let DrawPicture::Own(own) = draw.picture
                 && let Some(picture) = pictures.get_mut(own as usize)
             {
@@ -73,13 +76,16 @@ impl GpuNode {
                 alpha: draw.alpha,
                 picture: draw.picture,
                 wrap: draw.wrap,
+                projection: draw.projection,
             });
         }
         let vertices = bytemuck::cast_slice(&content.vertices[..]);
         let geometry = vertices.len() as u64 + content.indices.bytes();
+        let [min, max] = bounds(content);
         Self {
             origin: content.origin,
-            centre: content.origin + middle(content),
+            centre: content.origin + (min + max) / 2.0,
+            half: (max - min) / 2.0,
             level,
             vertices: buffer("vertices", vertices, BufferUsages::VERTEX),
             indices: buffer("indices", indices, BufferUsages::INDEX),
@@ -98,10 +104,10 @@ impl Drop for GpuNode {
     }
 }
 
-/// The middle of the vertices' bounding box, relative to the origin.
-fn middle(content: &Content) -> DVec3 {
+/// The box around the vertices, relative to the origin.
+fn bounds(content: &Content) -> [DVec3; 2] {
     let mut corners = content.vertices.iter().map(|vertex| glam::Vec3::from(vertex.position));
-    let Some(first) = corners.next() else { return DVec3::ZERO };
-    let (min, max) = corners.fold((first, first), |(min, max), at| (min.min(at), max.max(at)));
-    (min.as_dvec3() + max.as_dvec3()) / 2.0
+    let first = corners.next().unwrap_or_default();
+    let bounds = corners.fold([first; 2], |[min, max], at| [min.min(at), max.max(at)]);
+    bounds.map(|corner| corner.as_dvec3())
 }

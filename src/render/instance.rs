@@ -15,14 +15,23 @@ pub(super) struct Instance {
     pub alpha_scale: f32,
     /// Multiplies colour, linear.
     pub tint: [f32; 3],
+    /// [`Draw::projection`](super::content::Draw::projection), where there is one.
+    pub projection: [f32; 4],
 }
 
 impl Instance {
-    pub fn new(eye: DVec3, origin: DVec3, alpha: Alpha, tint: Vec3) -> Self {
+    pub fn new(
+        eye: DVec3,
+        origin: DVec3,
+        alpha: Alpha,
+        tint: Vec3,
+        projection: Option<[f32; 4]>,
+    ) -> Self {
         Self {
             offset: (origin - eye).as_vec3().to_array(),
             alpha_scale: alpha_scale(alpha),
             tint: tint.to_array(),
+            projection: projection.unwrap_or_default(),
         }
     }
 }

@@ -41,6 +41,6 @@ pub use adapter::{AdapterLabel, adapters};
 #[cfg(feature = "render")]
 pub use instance::level_tint;
 #[cfg(feature = "render")]
-pub use options::{RenderOptions, Shading};
+pub use options::{RenderOptions, Shading, Side};
 #[cfg(feature = "render")]
 pub use renderer::{DrawTimes, Renderer};

@@ -35,6 +35,17 @@ pub struct RenderOptions {
     /// Keep depths after drawing, for [`draw_over`](super::Renderer::draw_over) and
     /// [`depths`](super::Renderer::depths); no.
     pub keep_depths: bool,
+    /// What of nodes is drawn where they [are cut](super::Renderer::cut_at) at a box; nodes are whole.
+    pub cut: Option<Side>,
+}
+
+/// A side of a box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// What is in it.
+    Inside,
+    /// What is not.
+    Outside,
 }
 
 impl Default for RenderOptions {
@@ -47,6 +58,7 @@ impl Default for RenderOptions {
             cull: false,
             background: [178, 198, 216],
             keep_depths: false,
+            cut: None,
         }
     }
 }

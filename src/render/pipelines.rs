@@ -14,43 +14,74 @@ use wgpu::{
 use super::camera::Camera;
 use super::content::{Alpha, Draw, DrawPicture, Vertex};
 use super::instance::Instance;
-use super::options::{RenderOptions, Shading};
+use super::options::{RenderOptions, Shading, Side};
 use super::target::{COLOR_FORMAT, DEPTH_FORMAT};
 
 /// What divides the ways to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct PipelineKey {
-    textured: bool,
+    texture: Texture,
     /// 0 opaque, 1 mask, 2 screen.
     alpha: u8,
     cull: bool,
+    /// Cut at the box.
+    cut: bool,
+}
+
+/// Where texture coordinates come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Texture {
+    None,
+    Mapped,
+    Projected,
 }
 
 impl PipelineKey {
     pub fn of(draw: &Draw, options: &RenderOptions) -> Self {
         Self {
-            textured: draw.picture != DrawPicture::None,
+            texture: match (draw.picture, draw.projection) {
+                (DrawPicture::None, _) => Texture::None,
+                (_, None) => Texture::Mapped,
+                (_, Some(_)) => Texture::Projected,
+            },
             alpha: match draw.alpha {
                 Alpha::Opaque => 0,
                 Alpha::Mask { .. } => 1,
                 Alpha::Screen => 2,
             },
             cull: options.cull && !draw.double_sided,
+            cut: false,
         }
     }
 
-    /// Below [`PIPELINES`]; opaque ones first.
+    /// For what is cut at the box. What is projected never is.
+    pub fn when_cut(self) -> Self {
+        Self { cut: self.texture != Texture::Projected, ..self }
+    }
+
+    /// Itself, and what is needed where nodes may be cut.
+    pub fn and_cut(self, options: &RenderOptions) -> impl Iterator<Item = Self> {
+        let cut = options.cut.map(|_| self.when_cut());
+        std::iter::once(self).chain(cut.filter(|&cut| cut != self))
+    }
+
+    /// Below [`PIPELINES`]; opaque ones first, and what is projected, which is far, last of them.
     pub fn number(self) -> usize {
-        usize::from(self.alpha) * 4 + usize::from(self.textured) * 2 + usize::from(self.cull)
+        let texture = match (self.texture, self.cut) {
+            (Texture::None, cut) => usize::from(cut),
+            (Texture::Mapped, cut) => 2 + usize::from(cut),
+            (Texture::Projected, _) => 4,
+        };
+        usize::from(self.alpha) * 10 + texture * 2 + usize::from(self.cull)
     }
 }
 
-const PIPELINES: usize = 12;
+const PIPELINES: usize = 30;
 
 const VERTEX: [VertexAttribute; 3] =
     vertex_attr_array![0 => Float32x3, 1 => Float32x2, 2 => Unorm8x4];
-const INSTANCE: [VertexAttribute; 3] =
-    vertex_attr_array![3 => Float32x3, 4 => Float32, 5 => Float32x3];
+const INSTANCE: [VertexAttribute; 4] =
+    vertex_attr_array![3 => Float32x3, 4 => Float32, 5 => Float32x3, 6 => Float32x4];
 
 /// The ways to draw triangles.
 pub(super) struct Pipelines {
@@ -62,11 +93,12 @@ pub(super) struct Pipelines {
     plain: PipelineLayout,
     textured: PipelineLayout,
     shading: Shading,
+    cut: Option<Side>,
     made: [Option<RenderPipeline>; PIPELINES],
 }
 
 impl Pipelines {
-    pub fn new(device: &Device, shading: Shading) -> Self {
+    pub fn new(device: &Device, options: &RenderOptions) -> Self {
         let camera_layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor {
             label: Some("camera"),
             entries: &[entry(
@@ -111,8 +143,9 @@ impl Pipelines {
             textured: layout(&[Some(&camera_layout), Some(&picture_layout)]),
             camera_layout,
             picture_layout,
-            shading,
-            made: Default::default(),
+            shading: options.shading,
+            cut: options.cut,
+            made: [const { None }; PIPELINES],
         }
     }
 
@@ -129,19 +162,28 @@ impl Pipelines {
     }
 
     fn make(&self, device: &Device, key: PipelineKey) -> RenderPipeline {
-        let (layout, vertex, fragment) = if key.textured {
-            (&self.textured, "place_textured", "shade_textured")
-        } else {
-            (&self.plain, "place_plain", "shade_plain")
+        let (layout, vertex, fragment) = match (key.texture, key.cut) {
+            (Texture::None, false) => (&self.plain, "place_plain", "shade_plain"),
+            (Texture::None, true) => (&self.plain, "place_boxed_plain", "shade_boxed_plain"),
+            (Texture::Mapped, false) => (&self.textured, "place_textured", "shade_textured"),
+            (Texture::Mapped, true) => {
+                (&self.textured, "place_boxed_textured", "shade_boxed_textured")
+            }
+            (Texture::Projected, _) => (&self.textured, "place_projected", "shade_projected"),
         };
         let lit = match self.shading {
-            Shading::Photo => !key.textured,
+            Shading::Photo => key.texture == Texture::None,
             Shading::HeadLight => true,
             Shading::Unlit => false,
         };
         let flag = |flag: bool| f64::from(u8::from(flag));
-        let constants =
-            [("LIT", flag(lit)), ("MASK", flag(key.alpha == 1)), ("SCREEN", flag(key.alpha == 2))];
+        let constants = [
+            ("LIT", flag(lit)),
+            ("MASK", flag(key.alpha == 1)),
+            ("SCREEN", flag(key.alpha == 2)),
+            ("INSIDE", flag(self.cut == Some(Side::Inside))),
+            ("OUTSIDE", flag(self.cut == Some(Side::Outside))),
+        ];
         device.create_render_pipeline(&RenderPipelineDescriptor {
             label: None,
             layout: Some(layout),

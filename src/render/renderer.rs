@@ -16,8 +16,8 @@ use super::device::Device;
 use super::gpu_node::GpuNode;
 use super::gpu_picture::GpuPicture;
 use super::instance::{Instance, level_tint};
-use super::options::RenderOptions;
-use super::pipelines::Pipelines;
+use super::options::{RenderOptions, Side};
+use super::pipelines::{PipelineKey, Pipelines};
 use super::samplers::Samplers;
 use super::target::{Layer, Target};
 use super::thread_affinity;
@@ -57,6 +57,8 @@ pub struct Renderer {
     shared: FxHashMap<u32, GpuPicture>,
     /// Bytes of the nodes and shared pictures.
     bytes: u64,
+    /// Two corners of the box at which nodes are cut.
+    cut_at: Option<[DVec3; 2]>,
     /// Of the frame before, so that they are not allocated again.
     jobs: Vec<Job>,
     instance_data: Vec<Instance>,
@@ -91,7 +93,7 @@ impl Renderer {
         }
         let target =
             Target::new(&device.device, options.size, options.background, options.keep_depths);
-        let pipelines = Pipelines::new(&device.device, options.shading);
+        let pipelines = Pipelines::new(&device.device, options);
         let camera = device.device.create_buffer(&BufferDescriptor {
             label: Some("camera"),
             size: size_of::<Camera>() as u64,
@@ -125,6 +127,7 @@ impl Renderer {
             nodes: FxHashMap::default(),
             shared: FxHashMap::default(),
             bytes: 0,
+            cut_at: None,
             jobs: Vec::new(),
             instance_data: Vec::new(),
         })
@@ -235,6 +238,13 @@ impl Renderer {
         self.target.bytes()
     }
 
+    /// From now on, of nodes no more is drawn than what is on [the side](RenderOptions::cut) of a box that
+    /// was asked for, which is given by its least and greatest corner. Pictures that are projected are not
+    /// cut. Without such a side, nodes are whole.
+    pub fn cut_at(&mut self, cut_at: Option<[DVec3; 2]>) {
+        self.cut_at = cut_at.filter(|_| self.options.cut.is_some());
+    }
+
     /// Draws exactly these nodes and waits until they are drawn. All must have been uploaded, and
     /// the shared pictures that they use. Nothing nearer than `near` metres (above 0) is seen; how
     /// small that is costs no precision.
@@ -283,8 +293,12 @@ impl Renderer {
         for &node in front {
             let held = self.nodes.get(&node).ok_or_else(|| missing("node", node))?;
             let distance = held.centre.distance_squared(eye);
+            // One that is whole on the wrong side costs time, and nothing else.
+            let is_cut =
+                self.cut_at.is_some_and(|cut_at| !is_whole(held, cut_at, self.options.cut));
+            let pipeline = |key: PipelineKey| if is_cut { key.when_cut() } else { key };
             self.jobs.extend(held.draws.iter().zip(0..).map(|(part, draw)| Job {
-                pipeline: part.pipeline.number(),
+                pipeline: pipeline(part.pipeline).number(),
                 distance,
                 node,
                 draw,
@@ -308,7 +322,8 @@ impl Renderer {
             let draw = &held.draws[job.draw as usize];
             let tint =
                 if self.options.show_levels { level_tint(held.level).into() } else { Vec3::ONE };
-            let instance = Instance::new(pose.position, held.origin, draw.alpha, tint);
+            let instance =
+                Instance::new(pose.position, held.origin, draw.alpha, tint, draw.projection);
             self.instance_data.push(instance);
             triangles += draw.indices.len() as u64 / 3;
             if let DrawPicture::Shared(texture) = draw.picture {
@@ -318,7 +333,7 @@ impl Renderer {
                 picture.prepare(&self.device.device, layout, &mut self.samplers, draw.wrap);
             }
         }
-        let camera = Camera::new(pose, self.options.size, near);
+        let camera = Camera::new(pose, self.options.size, near, self.cut_at);
         self.device.queue.write_buffer(&self.camera, 0, bytemuck::bytes_of(&camera));
         let bytes: &[u8] = bytemuck::cast_slice(&self.instance_data);
         if bytes.len() as u64 > self.instances.size() {
@@ -409,6 +424,16 @@ impl Renderer {
         let buffer = self.target.copy_out(&self.device.device, &mut encoder, layer);
         self.device.wait(self.device.queue.submit([encoder.finish()]))?;
         self.target.pixels(&buffer).ok_or_else(lost)
+    }
+}
+
+/// Whether all of a node is on a side of a box.
+fn is_whole(node: &GpuNode, [min, max]: [DVec3; 2], side: Option<Side>) -> bool {
+    let (low, high) = (node.centre - node.half, node.centre + node.half);
+    match side {
+        Some(Side::Inside) => low.cmpge(min).all() && high.cmple(max).all(),
+        Some(Side::Outside) => low.cmpgt(max).any() || high.cmplt(min).any(),
+        None => true,
     }
 }
 

@@ -4,6 +4,9 @@ struct Camera {
     clip_from_scene: mat4x4<f32>,
     metres_per_pixel: vec2<f32>,
     corner: vec2<f32>,
+    // Two corners of a box, metres from the eye.
+    box_min: vec3<f32>,
+    box_max: vec3<f32>,
 }
 
 @group(0) @binding(0) var<uniform> camera: Camera;
@@ -16,6 +19,10 @@ override LIT: bool = false;
 override MASK: bool = false;
 // Fragments are left away by a pattern, as many as alpha says.
 override SCREEN: bool = false;
+// Fragments outside of the box are left away.
+override INSIDE: bool = false;
+// Fragments inside of the box are left away.
+override OUTSIDE: bool = false;
 
 struct Vertex {
     @location(0) position: vec3<f32>,
@@ -24,6 +31,7 @@ struct Vertex {
     @location(3) offset: vec3<f32>,
     @location(4) alpha_scale: f32,
     @location(5) tint: vec3<f32>,
+    @location(6) projection: vec4<f32>,
 }
 
 struct Textured {
@@ -35,6 +43,27 @@ struct Textured {
 struct Plain {
     @builtin(position) position: vec4<f32>,
     @location(0) color: vec4<f32>,
+}
+
+// The same with where they are, metres from the eye.
+struct BoxedTextured {
+    @builtin(position) position: vec4<f32>,
+    @location(0) color: vec4<f32>,
+    @location(1) texcoord: vec2<f32>,
+    @location(2) at: vec3<f32>,
+}
+
+struct BoxedPlain {
+    @builtin(position) position: vec4<f32>,
+    @location(0) color: vec4<f32>,
+    @location(2) at: vec3<f32>,
+}
+
+// Texture coordinates times the depth in the picture's own camera, and that depth: what is linear along
+// a triangle.
+struct Projected {
+    @builtin(position) position: vec4<f32>,
+    @location(0) texcoord: vec3<f32>,
 }
 
 // IEC 61966-2-1.
@@ -59,6 +88,31 @@ fn place_textured(vertex: Vertex) -> Textured {
 @vertex
 fn place_plain(vertex: Vertex) -> Plain {
     return Plain(place(vertex), color_of(vertex));
+}
+
+@vertex
+fn place_boxed_textured(vertex: Vertex) -> BoxedTextured {
+    let at = vertex.position + vertex.offset;
+    return BoxedTextured(place(vertex), color_of(vertex), vertex.texcoord, at);
+}
+
+@vertex
+fn place_boxed_plain(vertex: Vertex) -> BoxedPlain {
+    return BoxedPlain(place(vertex), color_of(vertex), vertex.position + vertex.offset);
+}
+
+@vertex
+fn place_projected(vertex: Vertex) -> Projected {
+    let depth = dot(vec4(vertex.position, 1.0), vertex.projection);
+    // What is drawn itself comes before a picture of it: depth is near over distance.
+    var at = place(vertex);
+    at.z *= 0.98;
+    return Projected(at, vec3(vertex.texcoord * depth, depth));
+}
+
+fn is_left_away(at: vec3<f32>) -> bool {
+    let inside = all(at >= camera.box_min) && all(at <= camera.box_max);
+    return (INSIDE && !inside) || (OUTSIDE && inside);
 }
 
 // How bright the plane of the triangle is, under a light behind the viewer and slightly above
@@ -107,4 +161,30 @@ fn shade_textured(fragment: Textured) -> @location(0) vec4<f32> {
 @fragment
 fn shade_plain(fragment: Plain) -> @location(0) vec4<f32> {
     return shade(fragment.color, fragment.position);
+}
+
+@fragment
+fn shade_boxed_textured(fragment: BoxedTextured) -> @location(0) vec4<f32> {
+    let texel = textureSample(picture, picture_sampler, fragment.texcoord);
+    let color = shade(texel * fragment.color, fragment.position);
+    if is_left_away(fragment.at) {
+        discard;
+    }
+    return color;
+}
+
+@fragment
+fn shade_boxed_plain(fragment: BoxedPlain) -> @location(0) vec4<f32> {
+    let color = shade(fragment.color, fragment.position);
+    if is_left_away(fragment.at) {
+        discard;
+    }
+    return color;
+}
+
+// A picture holds the light in which it was taken.
+@fragment
+fn shade_projected(fragment: Projected) -> @location(0) vec4<f32> {
+    let texel = textureSample(picture, picture_sampler, fragment.texcoord.xy / fragment.texcoord.z);
+    return vec4(texel.rgb, 1.0);
 }

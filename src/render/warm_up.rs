@@ -58,21 +58,24 @@ impl WarmUp {
                 DrawPicture::Own(own) => node.pictures.get(own as usize),
                 DrawPicture::Shared(texture) => shared(texture),
             };
-            let Some(kind) = kind(draw, picture) else { continue };
-            let Some(pipeline) = pipelines.get(draw.pipeline.number()) else { continue };
-            if !self.done.insert(kind) {
-                continue;
+            for key in [draw.pipeline, draw.pipeline.when_cut()] {
+                let Some(kind) = kind(key, draw, picture) else { continue };
+                // Those for cut nodes are made only where nodes may be cut.
+                let Some(pipeline) = pipelines.get(key.number()) else { continue };
+                if !self.done.insert(kind) {
+                    continue;
+                }
+                some = true;
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, camera, &[]);
+                if let Some(picture) = picture {
+                    pass.set_bind_group(1, picture.binding(draw.wrap), &[]);
+                }
+                pass.set_vertex_buffer(0, node.vertices.slice(..));
+                pass.set_vertex_buffer(1, instances.slice(..));
+                pass.set_index_buffer(node.indices.slice(..), node.index_format);
+                pass.draw_indexed(draw.indices.start..draw.indices.start + 3, 0, 0..1);
             }
-            some = true;
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, camera, &[]);
-            if let Some(picture) = picture {
-                pass.set_bind_group(1, picture.binding(draw.wrap), &[]);
-            }
-            pass.set_vertex_buffer(0, node.vertices.slice(..));
-            pass.set_vertex_buffer(1, instances.slice(..));
-            pass.set_index_buffer(node.indices.slice(..), node.index_format);
-            pass.draw_indexed(draw.indices.start..draw.indices.start + 3, 0, 0..1);
         }
         drop(pass);
         if some { device.wait(device.queue.submit([encoder.finish()])) } else { Ok(()) }
@@ -80,12 +83,12 @@ impl WarmUp {
 }
 
 /// `None` where the picture that it needs is not there.
-fn kind(draw: &GpuDraw, picture: Option<&GpuPicture>) -> Option<Kind> {
+fn kind(key: PipelineKey, draw: &GpuDraw, picture: Option<&GpuPicture>) -> Option<Kind> {
     match (draw.picture, picture) {
-        (DrawPicture::None, _) => Some((draw.pipeline, None)),
+        (DrawPicture::None, _) => Some((key, None)),
         (_, Some(picture)) => {
             picture.binding(draw.wrap)?;
-            Some((draw.pipeline, Some((draw.wrap, picture.kind()))))
+            Some((key, Some((draw.wrap, picture.kind()))))
         }
         (_, None) => None,
     }

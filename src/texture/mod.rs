@@ -18,6 +18,8 @@ mod block;
 mod cache;
 mod charts;
 pub(crate) mod encode;
+#[cfg(feature = "render")]
+mod face_picture;
 mod fill;
 mod islands;
 mod level;
@@ -39,6 +41,8 @@ mod wrapped_page;
 pub use bake::{BakeClasses, BakePlan, BakeReason, BakedMesh, Seams};
 pub use block::{BlockTextures, TextureOptions, texture_factors};
 pub use cache::TextureCache;
+#[cfg(feature = "render")]
+pub(crate) use face_picture::face_picture;
 pub use node::{AppendedSkirts, TexturedNode};
 pub use plan::{TexturePlan, TextureUse};
 pub use shared::{SharedFile, SharedTextures};

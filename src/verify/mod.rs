@@ -18,6 +18,7 @@
 mod appearance;
 mod assembly;
 mod border;
+mod cells;
 mod cut_planes;
 mod distance;
 mod distance_stats;
@@ -145,6 +146,7 @@ impl Verification<'_> {
         report.other_sources = other_sources::other_sources(out, sources)?;
         let (mut geometry, check) = structure::structure(out, scene, &options.limits, progress);
         report.checks.push(check);
+        report.checks.extend(cells::cells(out, scene, progress));
         if geometry.iter().any(|node| node.triangles.is_empty()) {
             // What is missing would fail every other check too, and hide its own faults.
             return Ok(());

@@ -13,6 +13,8 @@ mod support;
 mod adapter;
 mod bench_support;
 
+#[cfg(feature = "render")]
+mod cells;
 mod cli;
 mod damage;
 mod faults;

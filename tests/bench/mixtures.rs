@@ -130,8 +130,16 @@ fn fronts(tree: &SceneTree) -> Vec<(String, Vec<u32>)> {
 
 fn inspect(reference: &mut Reference, pose: &Pose, front: &[u32]) -> Accuracy {
     let view = View::new(*pose, DVec3::ZERO, SIZE);
-    let sample =
-        FrameSample { frame: 0, view: &view, front, hidden: &[], before: None, drawn: None };
+    let sample = FrameSample {
+        frame: 0,
+        view: &view,
+        front,
+        faces: &[],
+        cull_box: None,
+        hidden: &[],
+        before: None,
+        drawn: None,
+    };
     reference.inspect(sample).unwrap()
 }
 

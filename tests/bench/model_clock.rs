@@ -95,6 +95,7 @@ fn replay(scene: &Scene, frames: usize, target_ms: f64) -> Vec<FrameRecord> {
         residency: Arc::new(Mutex::new(residency)),
         backend: &mut backend,
         occluders: None,
+        cells: None,
         costs: CostModel::new(&constants.prices),
         inspector: None,
         options,

@@ -7,7 +7,7 @@ use image::{GrayImage, Luma, Rgb, RgbImage, RgbaImage};
 
 use super::accuracy::{Accuracy, FrameInspector, FrameSample, ReferenceContext, WorstFrame};
 use super::session::Session;
-use crate::camera::{Pose, View};
+use crate::camera::View;
 use crate::picture_error::{Gaps, PIXELS_PER_DEGREE, flip, mean_squared_error, ssim};
 use crate::render::RenderOptions;
 use crate::render::content::TextureFormat;
@@ -73,8 +73,14 @@ impl Reference {
         Ok(Self { fronts, ..self })
     }
 
-    fn render_front(&mut self, front: &[u32], pose: &Pose) -> Result<RgbaImage> {
-        self.fronts.as_mut().unwrap_or(&mut self.renderer).render(front, pose)
+    /// A front beside the faces of a frame.
+    fn render_front(&mut self, front: &[u32], frame: &FrameSample<'_>) -> Result<RgbaImage> {
+        let renderer = self.fronts.as_mut().unwrap_or(&mut self.renderer);
+        renderer.cut_at(frame.cull_box);
+        let drawn: Vec<u32> = front.iter().chain(frame.faces).copied().collect();
+        let picture = renderer.render(&drawn, &frame.view.pose);
+        renderer.cut_at(None);
+        picture
     }
 
     /// Inspects every frame in which levels toggled as well.
@@ -123,11 +129,11 @@ impl FrameInspector for Reference {
     }
 
     fn inspect(&mut self, sample: FrameSample<'_>) -> Result<Accuracy> {
-        let FrameSample { frame, view, front, before, drawn, .. } = sample;
+        let &FrameSample { frame, view, front, before, .. } = &sample;
         let pose = &view.pose;
-        let drawn = match drawn {
-            Some(drawn) => drawn,
-            None => self.render_front(front, pose)?,
+        let drawn = match &sample.drawn {
+            Some(drawn) => drawn.clone(),
+            None => self.render_front(front, &sample)?,
         };
         let leaves = seen(self.renderer.tree(), &self.leaves, view);
         let reference = self.renderer.render(&leaves, pose)?;
@@ -158,7 +164,7 @@ impl FrameInspector for Reference {
         };
         if let Some(before) = before {
             let before = front_before(self.renderer.tree(), before, front);
-            let before = opaque(&self.render_front(&before, pose)?);
+            let before = opaque(&self.render_front(&before, &sample)?);
             let pop = flip(&before, picture, PIXELS_PER_DEGREE).ok_or_else(other_size)?;
             accuracy.pop_flip = Some(pop.mean());
         }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use glam::DVec3;
 use image::RgbaImage;
 
 use crate::bench::node_cache::NodeCache;
@@ -90,6 +91,11 @@ impl ReferenceRenderer {
         }
         self.draw_part(&part, pose)?;
         self.cache.borrowed_renderer().surface()
+    }
+
+    /// From now on draws of nodes what [is on a side](Renderer::cut_at) of a box.
+    pub fn cut_at(&mut self, cut_at: Option<[DVec3; 2]>) {
+        self.cache.renderer().cut_at(cut_at);
     }
 
     /// Metres along the view to what the last picture shows, infinite where that is nothing.

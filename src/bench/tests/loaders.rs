@@ -80,6 +80,7 @@ fn replay(name: &str, cap: u64, loads: fn(u32) -> bool, is_broken: fn(u32) -> bo
         residency: Arc::new(Mutex::new(residency)),
         backend: &mut Loader { model, frames: 0, loads, is_broken },
         occluders: None,
+        cells: None,
         costs: CostModel::new(&constants().prices),
         inspector: None,
         options,

@@ -96,6 +96,7 @@ fn replay_by(
         residency: Arc::new(Mutex::new(residency)),
         backend: &mut backend,
         occluders: None,
+        cells: None,
         costs: CostModel::new(&constants.prices),
         inspector: match inspector {
             Some(inspector) => Some(inspector),
@@ -326,6 +327,7 @@ fn a_front_that_is_none_ends_the_run_with_policy_frame_and_rule() {
         residency: Arc::new(Mutex::new(residency)),
         backend: &mut ModelBackend::new(&tree, constants(), 0),
         occluders: None,
+        cells: None,
         costs: CostModel::new(&constants().prices),
         inspector: None,
         options,

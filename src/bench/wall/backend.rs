@@ -92,7 +92,8 @@ impl<'a> GpuBackend<'a> {
         for (texture, picture) in &arrival.pictures {
             self.renderer.upload_shared(*texture, picture)?;
         }
-        let level = self.tree.node(arrival.node).level;
+        let is_node = (arrival.node as usize) < self.tree.len();
+        let level = if is_node { self.tree.node(arrival.node).level } else { 0 };
         self.renderer.upload(arrival.node, level, &arrival.content)
     }
 }
@@ -153,6 +154,7 @@ impl Backend for GpuBackend<'_> {
 
     fn draw(&mut self, front: &[u32], view: &View) -> Result<Drawn> {
         let begin = Instant::now();
+        self.renderer.cut_at(view.frustum.box_within());
         let times = self.renderer.draw(front, &view.pose, self.near)?;
         Ok(Drawn { draw_ms: begin.elapsed().as_secs_f64() * 1e3, gpu_ms: times.gpu_ms })
     }

@@ -84,7 +84,7 @@ impl Samples {
         let (first_ms, times) = times(measured.renderer(), front, pose, tree.near_plane())?;
         let ms = percentile(&times, 50.0);
         self.frames.push((FrontLoad::default().of(tree, front, &view, 0), ms));
-        self.measured.push((TileLoad::default().of(tree, front, &view), ms));
+        self.measured.push((TileLoad::default().of(tree, &[], front, &view), ms));
         self.noise.push(deviation(&times) / ms);
         self.cold_ms += first_ms - ms;
         Ok(ms)

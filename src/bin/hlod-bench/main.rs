@@ -222,12 +222,15 @@ fn replay_once(arguments: &RunArgs) -> Result<(serde_json::Value, Option<Error>)
     let (Some(dir), Some(path)) = (&arguments.scene, &arguments.path) else {
         return Err(Error::Usage("expected OUT and PATH.csv".into()));
     };
-    let session = Session::open(dir)?;
+    let mut session = Session::open(dir)?;
     let path_name = path.display().to_string();
     let path = camera::read_path(path, session.scene().up)?;
     let constants = arguments.constants.as_deref().map(ClockConstants::read).transpose()?;
     let options = arguments.options()?;
     options.check()?;
+    if options.far_field {
+        session = session.with_cells()?;
+    }
     check_output(&arguments.out)?;
     let bar = Bar::new(arguments.quiet, path.frames.len());
     let job = Job { arguments, session: &session, path: &path, options, constants, bar: &bar };
@@ -265,7 +268,7 @@ struct Job<'a> {
 fn run(job: Job) -> Result<(Run, Context)> {
     let Job { arguments, session, path, options, constants, bar } = job;
     use hlod::bench::{FrameInspector, Reference, SilhouetteTolerance, Snapshots};
-    use hlod::render::{RenderOptions, Renderer, Shading};
+    use hlod::render::{RenderOptions, Renderer, Shading, Side};
     use run_args::ShadingArg;
     let render = RenderOptions {
         size: options.size.0,
@@ -277,6 +280,7 @@ fn run(job: Job) -> Result<(Run, Context)> {
         },
         show_levels: arguments.show_levels,
         cull: arguments.cull,
+        cut: options.far_field.then_some(Side::Inside),
         ..RenderOptions::default()
     };
     let tolerance = SilhouetteTolerance {

@@ -158,6 +158,7 @@ fn plan(arguments: &PoliciesArgs) -> PoliciesPlan {
             },
             size: arguments.size,
             cull_hidden: arguments.visibility == Switch::On,
+            far_field: false,
             ..BenchOptions::default()
         },
     }

@@ -59,6 +59,10 @@ pub struct RunArgs {
     /// time
     #[arg(long, value_enum, default_value_t = Switch::On, help_heading = "Selection")]
     pub visibility: Switch,
+    /// What is drawn of what is far: `off`, the hierarchy; `cells`, the faces of the cell in which the eye is,
+    /// which `hlod-build cells` makes, and elsewhere the hierarchy
+    #[arg(long, value_enum, default_value_t = FarFieldArg::Off, help_heading = "Selection")]
+    pub far_field: FarFieldArg,
 
     /// maxMemory: memory cap in bytes, loads in progress included; with KiB, MiB or GiB
     #[arg(long, value_name = "BYTES", default_value_t = Bytes(RESIDENCY.max_memory_bytes), help_heading = "Memory and loading")]
@@ -209,6 +213,13 @@ fn parse_setting(text: &str) -> std::result::Result<(String, f64), String> {
     }
 }
 
+/// What is drawn of what is far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FarFieldArg {
+    Off,
+    Cells,
+}
+
 impl RunArgs {
     pub fn options(&self) -> Result<BenchOptions> {
         let settings: Settings = self.set.iter().cloned().collect();
@@ -225,6 +236,7 @@ impl RunArgs {
             size: self.size,
             warm_up_frames: self.warm_up_frames,
             cull_hidden: self.visibility == Switch::On,
+            far_field: self.far_field == FarFieldArg::Cells,
             textures: self.textures.format().unwrap_or_default(),
             seed: self.seed,
         })

@@ -343,3 +343,32 @@ fn numbers_out_of_range_are_refused_and_single_frames_made() {
         assert_eq!(make_path(&ground, kind, 40, 1000.0, 1).unwrap().frames.len(), 40);
     }
 }
+
+#[test]
+fn eyes_of_streets_are_where_walks_go_and_those_over_a_scene_are_everywhere() {
+    for up in [UpAxis::Y, UpAxis::Z] {
+        let town = town(up, 1.0, true);
+        let eyes: Vec<DVec3> = street_eyes(&town).iter().map(|&eye| town.plan.map(eye)).collect();
+        let walk = make_path(&town, PathKind::Walk, 300, 30.0, 1).unwrap();
+        for frame in &walk.frames {
+            let at = town.plan.map(frame.pose.position);
+            let nearest = eyes.iter().map(|eye| eye.distance(at)).fold(f64::INFINITY, f64::min);
+            assert!(nearest < 1.0, "{nearest} m from {at}");
+        }
+        // No eye is in a house, and there are none beside the town.
+        let is_in_house = |eye: &DVec3| {
+            let at = eye.truncate() - town.bounds[0].truncate();
+            let within = (at - 10.0).rem_euclid(DVec2::splat(40.0));
+            within.cmpgt(DVec2::ZERO).all() && within.cmplt(DVec2::splat(30.0)).all()
+        };
+        assert!(eyes.len() > 1000 && !eyes.iter().any(is_in_house));
+
+        let over = eyes_over(&town, 20.0, 50.0);
+        assert_eq!(over.len(), 11 * 9, "210 m by 170 m");
+        for eye in over {
+            let at = town.plan.map(eye);
+            let above = at.z - town.height_at(at.truncate());
+            assert!((above - 50.0).abs() < 1e-6, "{above}");
+        }
+    }
+}

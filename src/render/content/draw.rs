@@ -47,6 +47,10 @@ pub struct Draw {
     pub alpha: Alpha,
     /// Seen from both sides.
     pub double_sided: bool,
+    /// The picture is what a camera saw, and is projected from there: the depth of a vertex in that camera
+    /// is the dot product of this with its position and 1. Texture coordinates alone would bend along
+    /// large triangles.
+    pub projection: Option<[f32; 4]>,
 }
 
 impl Draw {
@@ -55,6 +59,7 @@ impl Draw {
             && self.wrap == other.wrap
             && self.alpha == other.alpha
             && self.double_sided == other.double_sided
+            && self.projection == other.projection
     }
 }
 
@@ -125,7 +130,8 @@ fn looks(surface: &Surface, places: &[DrawPicture]) -> Option<Draw> {
         AlphaMode::Mask { cutoff } => Alpha::Mask { cutoff },
         AlphaMode::Blend => Alpha::Screen,
     };
-    Some(Draw { indices: 0..0, picture, wrap, alpha, double_sided: surface.double_sided })
+    let double_sided = surface.double_sided;
+    Some(Draw { indices: 0..0, picture, wrap, alpha, double_sided, projection: None })
 }
 
 /// Equal for draws that look alike. Opaque ones come first: they hide what is behind them at the

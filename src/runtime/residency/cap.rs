@@ -96,9 +96,7 @@ impl Residency {
         }
         let may_leave = |residency: &Self, children: &[u32], node: u32| {
             let record = &residency.nodes[node as usize];
-            record.state == NodeState::Resident
-                && record.parent.is_some()
-                && children[node as usize] == 0
+            record.state == NodeState::Resident && !record.is_root && children[node as usize] == 0
         };
         let mut least: BinaryHeap<_> = (0..self.nodes.len() as u32)
             .filter(|&node| may_leave(self, &children, node))

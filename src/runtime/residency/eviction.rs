@@ -128,8 +128,7 @@ impl Residency {
     /// Resident, not a root, and without children in memory other than `victims`.
     fn may_leave(&self, node: u32, victims: &[u32]) -> bool {
         let record = &self.nodes[node as usize];
-        if record.state != NodeState::Resident || record.parent.is_none() || victims.contains(&node)
-        {
+        if record.state != NodeState::Resident || record.is_root || victims.contains(&node) {
             return false;
         }
         let held = record.children_held;

@@ -59,9 +59,12 @@ pub struct Changes {
 }
 
 fn record(tree: &SceneTree, sizes: &Sizes, node: u32) -> NodeRecord {
+    let is_node = (node as usize) < tree.len();
+    let parent = if is_node { tree.node(node).parent } else { None };
     NodeRecord {
         state: NodeState::Absent,
-        parent: tree.node(node).parent,
+        parent,
+        is_root: is_node && parent.is_none(),
         children_held: 0,
         visited: 0,
         ahead: 0,
@@ -75,7 +78,8 @@ impl Residency {
     /// Nothing in memory yet; [`load_root`](Self::load_root) comes next. Fails where the roots
     /// alone do not fit below the cap.
     pub fn new(tree: &SceneTree, sizes: Sizes, options: ResidencyOptions) -> Result<Self> {
-        let nodes = tree.len();
+        // Faces of cells come after the nodes.
+        let nodes = sizes.nodes.len();
         let mut residency = Self {
             budget: MemoryBudget::new(options.max_memory_bytes, sizes.textures.len()),
             list: PriorityList::new(nodes),
@@ -159,6 +163,19 @@ impl Residency {
         }
         self.list.update(visited);
         self.list.update(others);
+    }
+
+    /// Takes faces of cells that the frame wants beside the nodes.
+    pub fn set_faces(&mut self, faces: &[(u32, f64)]) {
+        for &(face, priority) in faces {
+            let record = &mut self.nodes[face as usize];
+            record.visited = self.frame;
+            record.recent.update(self.span, priority);
+            if record.state != NodeState::Resident {
+                self.missed.push(face);
+            }
+        }
+        self.list.update(faces);
     }
 
     /// Takes nodes that may be wanted soon, none of which the frame visited, after those that it did.
@@ -254,12 +271,15 @@ impl Residency {
             && self.fits(node, reservations)
     }
 
-    /// Visited in the last frame, not in memory, and the parent is.
+    /// Visited in the last frame, not in memory, and the parent is, where it has one.
     fn wants(&self, node: u32) -> bool {
         let record = &self.nodes[node as usize];
         let is_resident = |parent: u32| self.nodes[parent as usize].state == NodeState::Resident;
         let outside = matches!(record.state, NodeState::Absent | NodeState::Loading { .. });
-        outside && record.visited == self.frame && record.parent.is_some_and(is_resident)
+        outside
+            && record.visited == self.frame
+            && !record.is_root
+            && record.parent.is_none_or(is_resident)
     }
 
     fn chunk(&mut self, node: u32) -> Step {

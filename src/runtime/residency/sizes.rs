@@ -1,6 +1,7 @@
 //! How many bytes things take, on disk and in memory.
 
 use crate::format::Scene;
+use crate::format::cells::Face;
 
 /// Bytes of one node.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -72,6 +73,25 @@ impl Sizes {
             })
             .collect();
         Self { nodes, textures }
+    }
+
+    /// The same with the faces of cells after the nodes; `face` says how many bytes one holds for drawing:
+    /// of vertices, triangles and pictures.
+    pub fn with_faces(
+        mut self,
+        faces: &[Face],
+        face: impl Fn(u32, u32, &[[u32; 2]]) -> u64,
+    ) -> Self {
+        self.nodes.extend(faces.iter().map(|at| {
+            let pictures: Vec<[u32; 2]> = at.views.iter().map(|view| view.size).collect();
+            NodeSize {
+                file_bytes: at.file_bytes,
+                held_bytes: face(at.vertices, at.triangles, &pictures),
+                beside_bytes: 0,
+                textures: Vec::new(),
+            }
+        }));
+        self
     }
 
     /// The same with what is held beside nodes, by their index.

@@ -59,6 +59,8 @@ pub struct Counters {
 pub(super) struct NodeRecord {
     pub state: NodeState,
     pub parent: Option<u32>,
+    /// The coarsest there is of its piece: it never leaves. What has no parent and is none is a face.
+    pub is_root: bool,
     /// Children that are not absent.
     pub children_held: u32,
     /// The frame in which it was visited last.
@@ -76,7 +78,8 @@ pub(super) struct NodeRecord {
 ///
 /// A node is loaded only once its parent is resident, and evicted only once none of its
 /// children is in memory, so that whatever is drawn can always be replaced by its parent. Roots
-/// never leave.
+/// never leave. The faces of cells, whose numbers come after those of nodes, have no parents: they come
+/// and go as they are wanted, since nodes can always be drawn in their place.
 #[derive(Clone, Debug)]
 pub struct Residency {
     pub(super) options: ResidencyOptions,

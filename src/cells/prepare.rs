@@ -1,0 +1,171 @@
+//! Makes cells and writes them.
+
+use std::path::Path;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::face::{Capture, DIRECTIONS, Layer, Made};
+use super::options::CellOptions;
+use crate::bench::Session;
+use crate::bench::write_beside;
+use crate::format::cells::{CELLS_DIR, CELLS_FILE, Cell, Cells, Face};
+use crate::format::{NodeLabel, file_crc, write_glb};
+use crate::{Error, Result};
+
+/// The index is written again after so many cells, so that a run that is killed loses no more.
+const CELLS_BETWEEN: usize = 16;
+
+/// Is told how far it is.
+pub trait Progress {
+    /// So many cells are to be made; `known` are there from an earlier run.
+    fn begin(&self, cells: usize, known: usize);
+    /// A cell is made.
+    fn done(&self);
+}
+
+/// What was made.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Prepared {
+    /// Cells that there are now.
+    pub cells: usize,
+    /// Of these, those that an earlier run had made.
+    pub known: usize,
+    /// Their faces.
+    pub faces: usize,
+    /// Triangles of all faces.
+    pub triangles: u64,
+    /// Bytes of all faces.
+    pub bytes: u64,
+    /// Files of the scene that could not be used, each with what was wrong.
+    pub broken: Vec<String>,
+}
+
+/// Makes those cells of a built scene that are not there yet, and writes them into its folder. Cells that
+/// were made with the same options stay, others go.
+pub fn prepare(
+    out: &Path,
+    places: &[[i64; 3]],
+    options: &CellOptions,
+    adapter: Option<&str>,
+    progress: &dyn Progress,
+) -> Result<Prepared> {
+    options.check()?;
+    let session = Session::open(out)?;
+    let mut cells = earlier(out, &session, options)?;
+    let mut missing: Vec<[i64; 3]> = places.to_vec();
+    missing.sort_unstable();
+    missing.dedup();
+    missing.retain(|&place| cells.cell(place).is_none());
+    let known = cells.cells.len();
+    progress.begin(known + missing.len(), known);
+    let mut capture = Capture::new(&session, options, adapter)?;
+    let dir = out.join(CELLS_DIR);
+    std::fs::create_dir_all(&dir)
+        .map_err(|error| Error::output(&dir, format!("cannot make the folder: {error}")))?;
+    for part in missing.chunks(CELLS_BETWEEN) {
+        let mut more = Vec::with_capacity(part.len());
+        for &place in part {
+            more.push(cell(out, &mut capture, &session, place, options)?);
+            progress.done();
+        }
+        cells.add(more);
+        write_beside(&out.join(CELLS_FILE), &cells.to_bytes()?)?;
+    }
+    Ok(Prepared {
+        cells: cells.cells.len(),
+        known,
+        faces: cells.faces.len(),
+        triangles: cells.faces.iter().map(|face| u64::from(face.triangles)).sum(),
+        bytes: cells.faces.iter().map(|face| face.file_bytes).sum(),
+        broken: capture.broken(),
+    })
+}
+
+/// The cells of an earlier run that can stay: made of the same build with the same options, and whole.
+fn earlier(out: &Path, session: &Session, options: &CellOptions) -> Result<Cells> {
+    let parameters = serde_json::to_value(options)
+        .map_err(|error| Error::Internal(format!("options without JSON form: {error}")))?;
+    let scene = session.scene().fingerprint;
+    let (cells, faces) = (Vec::new(), Vec::new());
+    let none = Cells { scene, parameters, size: options.cell_m, cells, faces };
+    let Ok(Some(mut found)) = Cells::read(out) else { return Ok(none) };
+    if (&found.scene, &found.parameters) != (&none.scene, &none.parameters) {
+        return Ok(none);
+    }
+    let is_whole = |face: &Face| {
+        std::fs::read(out.join(CELLS_DIR).join(&face.file))
+            .is_ok_and(|bytes| file_crc(&bytes) == face.file_crc)
+    };
+    found.retain(|faces| faces.iter().all(is_whole));
+    Ok(found)
+}
+
+/// Draws, makes and writes the faces of a cell.
+fn cell(
+    out: &Path,
+    capture: &mut Capture,
+    session: &Session,
+    place: [i64; 3],
+    options: &CellOptions,
+) -> Result<(Cell, Vec<Face>)> {
+    let min = DVec3::from_array(place.map(|at| at as f64)) * options.cell_m;
+    let max = min + DVec3::splat(options.cell_m);
+    let around = |metres: f64| [min - DVec3::splat(metres), max + DVec3::splat(metres)];
+    let cull_box = around(options.cull_m);
+    let shown = around(options.cull_m - options.overlap_m());
+    // Vertices are relative to it, and it stands in a file of f32.
+    let eye = ((min + max) / 2.0).as_vec3().as_dvec3();
+    let mut layers: [Vec<Layer>; DIRECTIONS.len()] = Default::default();
+    for offset in viewpoints(options) {
+        // The surface is made for an eye that moves from where the camera stands to anywhere in the cell.
+        let reach_m = options.reach_m() + offset.length();
+        let mut captured = Vec::new();
+        for direction in DIRECTIONS {
+            captured.push(capture.draw(eye + offset, shown, direction, options)?);
+        }
+        let known = &layers;
+        let more: Vec<Option<Layer>> = captured
+            .into_par_iter()
+            .map(|captured| {
+                let Some(mut captured) = captured else { return Ok(None) };
+                let is_new = offset == DVec3::ZERO
+                    || captured.keep_uncovered(known.iter().flatten(), eye, options);
+                if is_new { captured.layer(eye, reach_m, options) } else { Ok(None) }
+            })
+            .collect::<Result<_>>()?;
+        layers.iter_mut().zip(more).for_each(|(layers, more)| layers.extend(more));
+    }
+    let made = layers.map(|layers| Made::of(layers, eye));
+    let mut faces = Vec::new();
+    for (made, direction) in made.into_iter().zip(0..) {
+        let Some(made) = made else { continue };
+        let [i, j, k] = place;
+        let file = format!("c{i}_{j}_{k}-{direction}.glb");
+        let label = NodeLabel { id: direction, level: 0 };
+        let bytes = write_glb(&made.mesh, session.scene().up, label)?;
+        write_beside(&out.join(CELLS_DIR).join(&file), &bytes)?;
+        let primitives = &made.mesh.primitives;
+        faces.push(Face {
+            file,
+            file_bytes: bytes.len() as u64,
+            file_crc: file_crc(&bytes),
+            vertices: primitives.iter().map(|part| part.positions.len() as u32).sum(),
+            triangles: primitives.iter().map(|part| part.indices.len() as u32 / 3).sum(),
+            bounds: made.bounds,
+            error: made.error,
+            views: made.views,
+        });
+    }
+    let cull_box = cull_box.map(|corner| corner.to_array());
+    Ok((Cell { place, cull_box, faces: 0..0 }, faces))
+}
+
+/// Where pictures are taken, metres from a cell's middle: there, and from every other of its corners, from
+/// where most is seen that is hidden from there.
+fn viewpoints(options: &CellOptions) -> Vec<DVec3> {
+    let half = options.cell_m / 2.0;
+    let corners = [[-1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [1.0, -1.0, 1.0], [-1.0, 1.0, 1.0]];
+    let corners = corners.map(|corner| DVec3::from(corner) * half);
+    std::iter::once(DVec3::ZERO).chain(corners).collect()
+}

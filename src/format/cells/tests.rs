@@ -1,0 +1,105 @@
+use std::path::Path;
+
+use super::*;
+
+fn cells() -> Cells {
+    let face = Face {
+        file: "c-1_2_0-0.glb".into(),
+        file_bytes: 1234,
+        file_crc: 7,
+        vertices: 4,
+        triangles: 2,
+        bounds: [[0.0; 3], [1.0; 3]],
+        error: 0.004,
+        views: vec![FaceView {
+            size: [512, 99],
+            solid_angle: 0.5,
+            projection: [1.0, 0.0, 0.0, 2.0],
+        }],
+    };
+    let cell = |i: i64, faces| Cell { place: [i, 2, 0], cull_box: [[-10.0; 3], [20.0; 3]], faces };
+    Cells {
+        scene: [3; 32],
+        parameters: serde_json::json!({"cell": 4.0}),
+        size: 4.0,
+        cells: vec![cell(-1, 0..1), cell(3, 1..1)],
+        faces: vec![face],
+    }
+}
+
+fn read(bytes: &[u8]) -> Result<Cells, String> {
+    Cells::from_bytes(bytes, Path::new("cells.hlod")).map_err(|error| error.to_string())
+}
+
+/// With its length and checksum set right.
+fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    let length = bytes.len() as u64;
+    bytes[16..24].copy_from_slice(&length.to_le_bytes());
+    let body = bytes.len() - 4;
+    let crc = crc32fast::hash(&bytes[..body]);
+    bytes[body..].copy_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn what_is_written_is_read() {
+    let cells = cells();
+    assert_eq!(read(&cells.to_bytes().unwrap()), Ok(cells));
+}
+
+#[test]
+fn a_point_is_in_the_cell_around_it() {
+    let cells = cells();
+    assert_eq!(cells.place_of([-0.5, 11.9, 4.0]), [-1, 2, 1]);
+    let [min, max] = cells.bounds([-1, 2, 1]);
+    assert_eq!((min, max), ([-4.0, 8.0, 4.0], [0.0, 12.0, 8.0]));
+}
+
+#[test]
+fn bytes_that_are_damaged_or_missing_are_named_and_never_believed() {
+    let bytes = cells().to_bytes().unwrap();
+    for end in 0..bytes.len() {
+        assert!(read(&bytes[..end]).is_err(), "{end}");
+    }
+    for at in 0..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0x10;
+        assert!(read(&damaged).is_err(), "{at}");
+        // Whatever a file says whose checksum is right, reading it ends.
+        drop(read(&sealed(damaged)));
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let refused = |change: &dyn Fn(&mut Cells), expected: &str| {
+        let mut cells = cells();
+        change(&mut cells);
+        let error = read(&cells.to_bytes().unwrap()).unwrap_err();
+        assert!(error.contains(expected), "{error}");
+    };
+    refused(&|cells| cells.size = 0.0, "above 0");
+    refused(&|cells| cells.cells.reverse(), "order of places");
+    refused(&|cells| cells.faces[0].file = "../x.glb".into(), "plain");
+    refused(&|cells| cells.cells[0].cull_box[0][1] = f64::NAN, "cull box");
+    refused(&|cells| cells.faces[0].views[0].projection[3] = f32::INFINITY, "a view of");
+}
+
+#[test]
+fn cells_come_and_go_with_their_faces() {
+    let mut some = cells();
+    let face = Face { file: "other.glb".into(), ..some.faces[0].clone() };
+    let cell = Cell { place: [0, 0, 0], cull_box: [[0.0; 3]; 2], faces: 0..0 };
+    some.add(vec![(cell, vec![face.clone(), face])]);
+    let places: Vec<i64> = some.cells.iter().map(|cell| cell.place[0]).collect();
+    let files = |cells: &Cells, place| -> Vec<String> {
+        let of_cell = cells.faces_of(cells.cell(place).unwrap());
+        of_cell.iter().map(|face| face.file.clone()).collect()
+    };
+    assert_eq!(places, [-1, 0, 3]);
+    assert_eq!(files(&some, [0, 0, 0]), ["other.glb"; 2]);
+    assert_eq!(files(&some, [-1, 2, 0]), ["c-1_2_0-0.glb"]);
+    assert_eq!(files(&some, [3, 2, 0]), [""; 0]);
+    some.retain(|faces| faces.iter().all(|face| face.file != "other.glb"));
+    assert_eq!(some, cells());
+}
