@@ -51,6 +51,11 @@ impl Session {
         Ok(Self { cells: Some(Arc::new(cells)), ..self })
     }
 
+    /// The output folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
     /// The scene.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene

@@ -444,13 +444,6 @@ fn cells(arguments: &CellsArgs) -> Result<()> {
     });
     bar.0.finish_and_clear();
     let prepared = prepared??;
-    if let Some(first) = prepared.broken.first() {
-        let what = format!(
-            "{} files cannot be used; build again. The first: {first}",
-            prepared.broken.len()
-        );
-        return Err(Error::input(&arguments.out, what));
-    }
     if arguments.quiet {
         return Ok(());
     }

@@ -1,5 +1,7 @@
 //! Makes cells and writes them.
 
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::path::Path;
 
 use glam::DVec3;
@@ -37,12 +39,11 @@ pub struct Prepared {
     pub triangles: u64,
     /// Bytes of all faces.
     pub bytes: u64,
-    /// Files of the scene that could not be used, each with what was wrong.
-    pub broken: Vec<String>,
 }
 
 /// Makes those cells of a built scene that are not there yet, and writes them into its folder. Cells that
-/// were made with the same options stay, others go.
+/// were made with the same options stay, others go. Fails where a file of the scene cannot be used: a face
+/// would have a hole in the place of what is in it.
 pub fn prepare(
     out: &Path,
     places: &[[i64; 3]],
@@ -72,13 +73,13 @@ pub fn prepare(
         cells.add(more);
         write_beside(&out.join(CELLS_FILE), &cells.to_bytes()?)?;
     }
+    remove_others(&dir, &cells);
     Ok(Prepared {
         cells: cells.cells.len(),
         known,
         faces: cells.faces.len(),
         triangles: cells.faces.iter().map(|face| u64::from(face.triangles)).sum(),
         bytes: cells.faces.iter().map(|face| face.file_bytes).sum(),
-        broken: capture.broken(),
     })
 }
 
@@ -101,6 +102,16 @@ fn earlier(out: &Path, session: &Session, options: &CellOptions) -> Result<Cells
     Ok(found)
 }
 
+/// Removes faces of cells that are no more. What cannot be removed does no harm.
+fn remove_others(dir: &Path, cells: &Cells) {
+    let known: BTreeSet<&OsStr> = cells.faces.iter().map(|face| face.file.as_ref()).collect();
+    for entry in std::fs::read_dir(dir).into_iter().flatten().flatten() {
+        if !known.contains(entry.file_name().as_os_str()) {
+            drop(std::fs::remove_file(entry.path()));
+        }
+    }
+}
+
 /// Draws, makes and writes the faces of a cell.
 fn cell(
     out: &Path,
@@ -120,17 +131,24 @@ fn cell(
     for offset in viewpoints(options) {
         // The surface is made for an eye that moves from where the camera stands to anywhere in the cell.
         let reach_m = options.reach_m() + offset.length();
+        let is_middle = offset == DVec3::ZERO;
         let mut captured = Vec::new();
-        for direction in DIRECTIONS {
-            captured.push(capture.draw(eye + offset, shown, direction, options)?);
+        for (direction, layers) in DIRECTIONS.into_iter().zip(&layers) {
+            // Where nothing is seen from the middle, what is from elsewhere is beside it, and so in the face
+            // of another direction.
+            captured.push(match is_middle || !layers.is_empty() {
+                true => capture.draw(eye + offset, shown, direction, options)?,
+                false => None,
+            });
         }
+        capture.check()?;
         let known = &layers;
         let more: Vec<Option<Layer>> = captured
             .into_par_iter()
             .map(|captured| {
                 let Some(mut captured) = captured else { return Ok(None) };
-                let is_new = offset == DVec3::ZERO
-                    || captured.keep_uncovered(known.iter().flatten(), eye, options);
+                let is_new =
+                    is_middle || captured.keep_uncovered(known.iter().flatten(), eye, options);
                 if is_new { captured.layer(eye, reach_m, options) } else { Ok(None) }
             })
             .collect::<Result<_>>()?;

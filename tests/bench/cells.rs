@@ -116,8 +116,11 @@ fn cells_are_the_same_bytes_on_any_number_of_threads_and_go_on_where_they_were_s
         let is_of_these = [damaged, gone].iter().any(|file| cell_of(file) == cell_of(name));
         assert_eq!(is_again, is_of_these, "{name}");
     }
+    // With other options all are made again, and none of those before stays.
+    fs::write(dir.join("c9_9_9-0.glb"), b"of a cell that is no more").unwrap();
     assert!(prepare(&place, &["--jpeg-quality", "50"]));
     assert_ne!(made, bytes(&place));
+    assert!(made.keys().eq(bytes(&place).keys()));
     assert!(prepare(&place, &[]));
     assert_eq!(made, bytes(&place));
 }
@@ -200,9 +203,8 @@ fn faces_look_like_what_they_show_from_corners_that_no_picture_was_taken_from() 
     assert!(psnr > 25.0, "{psnr} dB, {seen:?}");
 }
 
-/// Slits of a pixel are left where one building ends before another, as seen from between the places from where
-/// pictures were taken: what is behind goes on for a pixel under what is before, and what is uncovered is
-/// found to a pixel. Found: 0.35 % of what faces cover.
+/// Slits are left where more than the three pixels are uncovered for which what is behind something goes on, and
+/// none of the five pictures saw what is there. Found: 0.1 % of what faces cover.
 #[test]
 fn no_background_shows_through_a_closed_city_but_for_slits_of_a_pixel() {
     let options = CityOptions {
@@ -229,7 +231,25 @@ fn no_background_shows_through_a_closed_city_but_for_slits_of_a_pixel() {
     let yaws = [0.0, 60.0, 120.0, 180.0, 240.0, 300.0];
     let Some(seen) = seen_from_other_corners(&place, &yaws) else { return };
     assert!(seen.of_faces > 100_000, "{seen:?}");
-    assert!(200 * seen.missing < seen.of_faces, "{seen:?}");
+    assert!(500 * seen.missing < seen.of_faces, "{seen:?}");
+}
+
+#[test]
+fn no_cells_are_made_of_a_scene_whose_files_are_damaged() {
+    let place = Place::new(city());
+    write_path(&walk(&place), &place.path().join("walk.csv")).unwrap();
+    for entry in fs::read_dir(place.out().join("nodes")).unwrap() {
+        fs::write(entry.unwrap().path(), b"damaged").unwrap();
+    }
+    let what = ["cells", "out", "--along", "walk.csv"];
+    let done = hlod_build(&place, &[&what[..], &OPTIONS].concat());
+    let error = String::from_utf8_lossy(&done.stderr);
+    if done.status.code() == Some(NO_ADAPTER) {
+        return skip(&error);
+    }
+    assert_eq!(done.status.code(), Some(INPUT), "{error}");
+    assert!(error.contains("build again") && error.contains(".glb"), "{error}");
+    assert!(!place.out().join("cells.hlod").exists());
 }
 
 #[test]

@@ -1,15 +1,17 @@
 //! Draws what is outside of a cull box.
 
+use std::path::PathBuf;
+
 use glam::DVec3;
 
 use super::Captured;
-use crate::Result;
 use crate::bench::{ReferenceRenderer, Session};
 use crate::camera::{Pose, View, from_angles};
 use crate::cells::options::CellOptions;
 use crate::mesh::UpAxis;
 use crate::render::{RenderOptions, Side};
 use crate::runtime::SceneTree;
+use crate::{Error, Result};
 
 /// Degrees of yaw and pitch of the six directions.
 pub(in crate::cells) const DIRECTIONS: [[f64; 2]; 6] =
@@ -25,6 +27,8 @@ const CAP_BYTES: u64 = 1 << 30;
 pub(in crate::cells) struct Capture {
     renderer: ReferenceRenderer,
     up: UpAxis,
+    /// The output folder, for messages.
+    dir: PathBuf,
 }
 
 impl Capture {
@@ -36,7 +40,7 @@ impl Capture {
             ..RenderOptions::default()
         };
         let renderer = ReferenceRenderer::new(session, &options, CAP_BYTES)?;
-        Ok(Self { renderer, up: session.scene().up })
+        Ok(Self { renderer, up: session.scene().up, dir: session.dir().to_owned() })
     }
 
     /// What is seen in a direction of the outside of a box; none where nothing is.
@@ -63,9 +67,15 @@ impl Capture {
         Ok(Some(Captured { picture, metres, eye, rotation }))
     }
 
-    /// Files that could not be used, each with what was wrong.
-    pub fn broken(&self) -> Vec<String> {
-        self.renderer.broken().cloned().collect()
+    /// Fails where a file could not be used.
+    pub fn check(&self) -> Result<()> {
+        match self.renderer.broken().next() {
+            Some(first) => {
+                let what = format!("a file cannot be used; build again: {first}");
+                Err(Error::input(&self.dir, what))
+            }
+            None => Ok(()),
+        }
     }
 }
 

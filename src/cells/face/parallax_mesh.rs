@@ -7,6 +7,10 @@ use super::depths::Depths;
 /// Corners of the square between four pixels, around it.
 const CORNERS: [[isize; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
 
+/// What is behind goes on for so many pixels more under what is before it. Seen from elsewhere, what is before
+/// moves: slits of a pixel or two were left without.
+const GOES_ON_PX: usize = 2;
+
 /// A surface in the space of [`Depths`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParallaxMesh {
@@ -21,8 +25,9 @@ impl ParallaxMesh {
     /// pixels, or where the surface on one side of the edge between them goes on in a straight line to
     /// the other side, within as much: no skin is spanned from what is near to what is far.
     ///
-    /// What is behind goes on for a pixel under what is before it, so that nothing shows between both; all else
-    /// ends half a pixel beyond the middle of its last, as surfaces do on average that end somewhere in it.
+    /// What is behind goes on for three pixels under what is before it, so that nothing shows between both;
+    /// all else ends half a pixel beyond the middle of its last, as surfaces do on average that end somewhere
+    /// in it.
     pub fn new(depths: &Depths<'_>, apart: f32) -> Self {
         let mut surface = Surface {
             depths,
@@ -37,6 +42,7 @@ impl ParallaxMesh {
                 surface.square([x as isize, y as isize]);
             }
         }
+        surface.go_on_behind();
         surface.mesh
     }
 }
@@ -75,6 +81,9 @@ impl Surface<'_> {
     fn square(&mut self, at: [isize; 2]) {
         let pixels = CORNERS.map(|corner| [at[0] + corner[0], at[1] + corner[1]]);
         let parallax = pixels.map(|pixel| self.parallax(pixel));
+        if parallax.iter().all(Option::is_none) {
+            return;
+        }
         let parts =
             parts([0, 1, 2, 3].map(|side| self.are_joined(pixels[side], pixels[(side + 1) % 4])));
         for part in 0..4 {
@@ -129,6 +138,74 @@ impl Surface<'_> {
                 let opposite = (corner + 2) % 4;
                 let [a, b] = beside.map(|to| straight(opposite, to));
                 Some(a? + b? - own[opposite]?)
+            }
+        }
+    }
+
+    /// What goes on behind something for a pixel goes on for some more.
+    fn go_on_behind(&mut self) {
+        let of_pixel = |(&at, points): (&usize, &Vec<u32>)| {
+            points.iter().map(move |&point| (at, point)).collect::<Vec<_>>()
+        };
+        let mut last: Vec<(usize, u32)> = self.behind.iter().flat_map(of_pixel).collect();
+        for _ in 0..GOES_ON_PX {
+            // Not in the order of a hash map.
+            last.sort_unstable();
+            let mut next = Vec::new();
+            for (at, point) in last {
+                let from = self.pixel(at);
+                for step in [[1, 0], [-1, 0], [0, 1], [0, -1]] {
+                    let to = [from[0] + step[0], from[1] + step[1]];
+                    next.extend(self.go_on_from(from, point, to));
+                }
+            }
+            last = next;
+        }
+        let mut corners: Vec<usize> = self.behind.keys().copied().collect();
+        corners.sort_unstable();
+        for at in corners {
+            self.fill_behind(self.pixel(at));
+        }
+    }
+
+    /// Goes on behind another pixel; the new point.
+    fn go_on_from(&mut self, from: [isize; 2], point: u32, to: [isize; 2]) -> Option<(usize, u32)> {
+        let before = self.parallax(to)?;
+        let parallax = self.mesh.points[point as usize][2];
+        let slope = self.near_at(beyond(from, to), parallax).map_or(0.0, |other| parallax - other);
+        let goes_on = parallax + slope;
+        if goes_on <= 0.0 || goes_on + self.apart >= before {
+            return None;
+        }
+        let count = self.mesh.points.len();
+        let point = self.point_behind(to, goes_on);
+        (self.mesh.points.len() > count).then_some((self.index(to), point))
+    }
+
+    /// The parallax of what is seen at a pixel, or goes on behind it, that is nearest to another, if near.
+    fn near_at(&self, pixel: [isize; 2], parallax: f32) -> Option<f32> {
+        let seen = self.parallax(pixel)?;
+        let behind = self.behind.get(&self.index(pixel)).into_iter().flatten();
+        let all = behind.map(|&point| self.mesh.points[point as usize][2]).chain([seen]);
+        nearest(all.map(|other| (other, other)), parallax, 2.0 * self.apart).map(|at| at.1)
+    }
+
+    /// Fills squares all of whose corners are behind something.
+    fn fill_behind(&mut self, at: [isize; 2]) {
+        let pixels = CORNERS.map(|corner| [at[0] + corner[0], at[1] + corner[1]]);
+        if pixels.iter().any(|&pixel| self.parallax(pixel).is_none()) {
+            return;
+        }
+        let points = pixels.map(|pixel| {
+            let points = self.behind.get(&self.index(pixel)).into_iter().flatten();
+            points.map(|&point| (point, self.mesh.points[point as usize][2])).collect::<Vec<_>>()
+        });
+        let apart = 2.0 * self.apart;
+        let [first, others @ ..] = points;
+        for a in first {
+            let near = others.each_ref().map(|at| nearest(at.iter().copied(), a.1, apart));
+            if let [Some(b), Some(c), Some(d)] = near {
+                self.fill([a, b, c, d]);
             }
         }
     }
@@ -217,6 +294,16 @@ impl Surface<'_> {
     fn index(&self, [x, y]: [isize; 2]) -> usize {
         y as usize * self.depths.width + x as usize
     }
+
+    fn pixel(&self, at: usize) -> [isize; 2] {
+        [at % self.depths.width, at / self.depths.width].map(|side| side as isize)
+    }
+}
+
+/// Of what has a parallax, what is nearest to one, within so many pixels.
+fn nearest<T>(all: impl Iterator<Item = (T, f32)>, parallax: f32, within: f32) -> Option<(T, f32)> {
+    let away = |other: f32| (other - parallax).abs();
+    all.filter(|at| away(at.1) <= within).min_by(|a, b| away(a.1).total_cmp(&away(b.1)))
 }
 
 /// The pixel before `a` on the line that goes on to `b`.
@@ -278,15 +365,14 @@ mod tests {
     fn nothing_is_spanned_between_what_is_near_and_what_is_far_and_nothing_shows_between_them() {
         let is_near = |x: usize, y: usize| (4..8).contains(&x) && (3..9).contains(&y);
         let box_before = mesh(|x, y| if is_near(x, y) { 10.0 } else { 50.0 });
-        // 4 × 6 pixels less their corners, which are cut half-way; behind them one goes on for a pixel all
-        // around.
+        // 4 × 6 pixels less their corners, which are cut half-way; behind them all goes on.
         assert_eq!(area_of(&box_before, |at| at == 10.0), 2.0 * (24.0 - 4.0 / 8.0));
-        assert_eq!(area_of(&box_before, |at| at == 2.0), 2.0 * (121.0 - 15.0));
-        let all = area_of(&box_before, |_| true);
-        assert_eq!(
-            all,
-            area_of(&box_before, |at| at == 2.0) + area_of(&box_before, |at| at == 10.0)
-        );
+        assert_eq!(area_of(&box_before, |at| at == 2.0), 2.0 * 121.0);
+        assert_eq!(area_of(&box_before, |_| true), 2.0 * (121.0 + 23.5));
+        // Behind 10 × 10 pixels it goes on for three from each side.
+        let is_near = |x: usize, y: usize| (1..11).contains(&x) && (1..11).contains(&y);
+        let large = mesh(|x, y| if is_near(x, y) { 10.0 } else { 50.0 });
+        assert_eq!(area_of(&large, |at| at == 2.0), 2.0 * (121.0 - 25.0));
     }
 
     #[test]
