@@ -31,7 +31,7 @@ def main():
     scenes += [(name, models) for name in names if (models := real_data(name))]
     made, drawn = [], []
     for name, models in scenes:
-        out = programs.work / f"cells-{name}"
+        out = programs.work / f"scene-cells-{name}"
         run([programs.path("hlod-build"), "--quiet", *map(str, models), str(out)])
         paths = {kind: path(programs, out, kind, frames) for kind in kinds}
         alone = {at: replay(programs, out, paths[at[0]], at[1], "off") for at in points(kinds)}
