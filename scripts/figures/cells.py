@@ -11,7 +11,7 @@ from common import DOCS, Options, Programs, machine, real_data, run, say, table,
 
 # One million triangles in 70 blocks, as in the other pages.
 CITY = {"blocks": 70, "triangles": 1_000_000, "texels_per_triangle": 17}
-REAL = ["hamada", "ingolstadt", "sceaux", "oblique_a"]
+REAL = ["hamada", "ingolstadt"]
 KINDS = ["walk", "drive"]
 TARGETS_MS = [30, 10]
 FRAMES, SETTLE, EVERY = 300, 100, 15
