@@ -16,7 +16,7 @@ KINDS = ["walk", "drive"]
 TARGETS_MS = [30, 10]
 FRAMES, SETTLE, EVERY = 300, 100, 15
 # (pixels along the side of a face, metres from a cell to its cull box)
-FACES = [(512, 60), (512, 120), (1024, 120)]
+FACES = [(512, 120)]
 # What a machine adds by chance: by the model clock, with lavapipe's prices.
 CLOCK = ["--clock", "model", "--seed", "1"]
 
