@@ -74,13 +74,11 @@ impl Frustum {
             let reach = half.x * x[side].abs() + half.y * y[side].abs() + half.z * z[side].abs();
             -(at + reach)
         });
-        let out =
+        let beyond =
             beyond.into_iter().fold(behind.max(0.0), |most, by| if by > most { by } else { most });
         match self.within {
-            None => out,
-            Some([min, max]) => {
-                (min - bbox[1]).max_element().max((bbox[0] - max).max_element()).max(out)
-            }
+            None => beyond,
+            Some(within) => beyond.max(outside_of(within, bbox)),
         }
     }
 
@@ -119,6 +117,14 @@ impl Frustum {
         });
         Some(Rectangle(ends))
     }
+}
+
+/// Metres by which a box is outside of another; below 0 where it is not. Out of the way of what is asked at
+/// every node of every frame: where no box is, pyramids took a fifth longer with it in line.
+#[cold]
+#[inline(never)]
+fn outside_of([min, max]: [DVec3; 2], bbox: [DVec3; 2]) -> f64 {
+    (min - bbox[1]).max_element().max((bbox[0] - max).max_element())
 }
 
 fn least(numbers: [f64; 8]) -> f64 {
@@ -264,5 +270,24 @@ mod tests {
                 );
             assert!(frustum.outside([point, point]) < 1e-9, "{point}");
         }
+    }
+
+    #[test]
+    fn outside_of_a_box_nothing_is_seen_either() {
+        let whole = frustum();
+        let eye = whole.eye;
+        let within = [eye - DVec3::splat(10.0), eye + DVec3::splat(10.0)];
+        let cut = whole.within(Some(within));
+        let ahead = |from: f64, to: f64| {
+            let ends = [from, to].map(|metres| eye + whole.forward * metres);
+            [ends[0].min(ends[1]), ends[0].max(ends[1])]
+        };
+        for (from, to, outside) in [(2.0, 5.0, 0.0), (8.0, 50.0, 0.0), (13.0, 50.0, 3.0)] {
+            assert_eq!(whole.outside(ahead(from, to)), 0.0);
+            assert_eq!(cut.outside(ahead(from, to)), outside);
+        }
+        let behind = ahead(-5.0, -4.0);
+        assert_eq!(cut.outside(behind), whole.outside(behind));
+        assert_eq!(cut.within(None), whole);
     }
 }
