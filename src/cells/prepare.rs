@@ -73,6 +73,8 @@ pub fn prepare(
         cells.add(more);
         write_beside(&out.join(CELLS_FILE), &cells.to_bytes()?)?;
     }
+    // Also where none was missing: what was damaged and is not asked for any more is gone from it.
+    write_beside(&out.join(CELLS_FILE), &cells.to_bytes()?)?;
     remove_others(&dir, &cells);
     Ok(Prepared {
         cells: cells.cells.len(),
@@ -106,7 +108,8 @@ fn earlier(out: &Path, session: &Session, options: &CellOptions) -> Result<Cells
 fn remove_others(dir: &Path, cells: &Cells) {
     let known: BTreeSet<&OsStr> = cells.faces.iter().map(|face| face.file.as_ref()).collect();
     for entry in std::fs::read_dir(dir).into_iter().flatten().flatten() {
-        if !known.contains(entry.file_name().as_os_str()) {
+        let is_face = entry.path().extension().is_some_and(|kind| kind == "glb");
+        if is_face && !known.contains(entry.file_name().as_os_str()) {
             drop(std::fs::remove_file(entry.path()));
         }
     }
