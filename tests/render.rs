@@ -328,6 +328,33 @@ fn great_coordinates_give_the_same_picture() {
 }
 
 #[test]
+fn what_has_no_picture_is_as_bright_from_wherever_it_is_seen_and_its_sides_differ() {
+    let lit = RenderOptions { shading: Shading::Photo, ..options() };
+    // A wall across the view, one beside it along the view, and ground.
+    let wall = mesh(vec![rectangle([-3.0, 3.0], [-3.0, 3.0], 2.0, plain([1.0; 3]))]);
+    let mut along = rectangle([-9.0, -9.0], [-9.0, 9.0], 0.0, plain([1.0; 3]));
+    let mut ground = rectangle([-900.0, 900.0], [-1.0, -1.0], 0.0, plain([1.0; 3]));
+    ground.positions[2][2] = -900.0;
+    ground.positions[3][2] = -900.0;
+    for (corner, z) in along.positions.iter_mut().zip([0.0, -900.0, -900.0, 0.0]) {
+        corner[2] = z;
+    }
+    let Some(image) = shot(&lit, &wall) else { return };
+    let ahead = at(&image, 0.0, 0.0);
+    let turns =
+        [DQuat::from_rotation_y(0.5), DQuat::from_rotation_x(0.4), DQuat::from_rotation_z(1.0)];
+    for rotation in turns {
+        let turned = shot_from(&lit, &wall, &Pose { rotation, ..pose() }).unwrap();
+        assert_near(at(&turned, 0.0, 0.0), ahead, 1);
+    }
+    let beside = at(&shot(&lit, &mesh(vec![along])).unwrap(), -0.9, 0.0);
+    let below = at(&shot(&lit, &mesh(vec![ground])).unwrap(), 0.0, -0.9);
+    let bright = [ahead, beside, below].map(|pixel| pixel[0]);
+    let differ = |a: usize, b: usize| bright[a].abs_diff(bright[b]) > 15;
+    assert!(differ(0, 1) && differ(1, 2) && differ(2, 0), "{bright:?}");
+}
+
+#[test]
 fn a_light_at_the_viewer_shows_how_planes_stand() {
     let lit = RenderOptions { shading: Shading::HeadLight, ..options() };
     let facing = mesh(vec![rectangle([-3.0, 3.0], [-3.0, 3.0], 2.0, plain([1.0; 3]))]);

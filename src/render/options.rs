@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Shading {
     /// As node files say: pictures hold their own light and are shown as they are; what has no
-    /// picture is lit as under [`HeadLight`](Self::HeadLight).
+    /// picture is lit from above and one side of the scene, the same from wherever it is seen.
     #[default]
     Photo,
     /// A light behind the viewer, slightly above (Cossutti, section 4.5), on everything. It

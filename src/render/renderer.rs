@@ -333,7 +333,7 @@ impl Renderer {
                 picture.prepare(&self.device.device, layout, &mut self.samplers, draw.wrap);
             }
         }
-        let camera = Camera::new(pose, self.options.size, near, self.cut_at);
+        let camera = Camera::new(pose, self.options.size, near, self.cut_at, self.options.shading);
         self.device.queue.write_buffer(&self.camera, 0, bytemuck::bytes_of(&camera));
         let bytes: &[u8] = bytemuck::cast_slice(&self.instance_data);
         if bytes.len() as u64 > self.instances.size() {

@@ -7,13 +7,15 @@ struct Camera {
     // Two corners of a box, metres from the eye.
     box_min: vec3<f32>,
     box_max: vec3<f32>,
+    // Right, down, ahead.
+    to_light: vec3<f32>,
 }
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 @group(1) @binding(0) var picture: texture_2d<f32>;
 @group(1) @binding(1) var picture_sampler: sampler;
 
-// Light comes from behind the viewer.
+// Surfaces are lit.
 override LIT: bool = false;
 // Fragments with less than half of the scaled alpha are left away.
 override MASK: bool = false;
@@ -115,19 +117,16 @@ fn is_left_away(at: vec3<f32>) -> bool {
     return (INSIDE && !inside) || (OUTSIDE && inside);
 }
 
-// How bright the plane of the triangle is, under a light behind the viewer and slightly above
-// (Cossutti, section 4.5), from either side.
+// How bright the plane of the triangle is, from either side.
 //
 // On a plane a·x + b·y + c·z = d the reciprocal of the distance is linear in the picture:
 // 1/z = a·(x/z) + b·(y/z) + c, each divided by d. So its slopes across the picture are the
 // plane's normal, and no normals need to be stored or interpolated.
-fn head_light(position: vec4<f32>) -> f32 {
+fn light_of(position: vec4<f32>) -> f32 {
     let slope = vec2(dpdx(position.w), dpdy(position.w)) / camera.metres_per_pixel;
     let at = camera.corner + position.xy * camera.metres_per_pixel;
     let normal = normalize(vec3(slope, position.w - dot(slope, at)));
-    // Right, down, ahead.
-    let to_light = vec3(0.0, -0.3304, -0.9438);
-    return 0.3 + 0.7 * abs(dot(normal, to_light));
+    return 0.3 + 0.7 * abs(dot(normal, camera.to_light));
 }
 
 // The threshold of a pixel: the sixteenths of a 4 × 4 Bayer matrix.
@@ -141,7 +140,7 @@ fn screen(position: vec4<f32>) -> f32 {
 fn shade(color: vec4<f32>, position: vec4<f32>) -> vec4<f32> {
     var light = 1.0;
     if LIT {
-        light = head_light(position);
+        light = light_of(position);
     }
     if MASK && color.a < 0.5 {
         discard;
