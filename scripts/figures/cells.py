@@ -1,7 +1,9 @@
 """Replays walks and drives with and without cells; see scripts/cells."""
 
+import base64
 import csv
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -17,32 +19,38 @@ TARGETS_MS = [30, 10]
 FRAMES, SETTLE, EVERY = 300, 100, 15
 # (pixels along the side of a face, metres from a cell to its cull box)
 FACES = [(512, 120)]
+WAYS = ["off", "cells", "auto"]
+# Streets of which pictures are shown, by the first frame of a walk at the last target.
+PICTURES = [("city", "walk"), ("hamada", "walk")]
+# Pictures in a report.
+JPEG = r"data:image/jpeg;base64,([A-Za-z0-9+/=]+)"
 # What a machine adds by chance: by the model clock, with lavapipe's prices.
 CLOCK = ["--clock", "model", "--seed", "1"]
 
 
 def main():
     arguments = Options("cells", __doc__, quick="a few frames of one scene", real=True).parse()
-    programs = Programs(features=True)
+    programs = Programs(examples=["tile_pictures"], features=True)
     frames = 60 if arguments.quick else FRAMES
     kinds = KINDS[:1] if arguments.quick else KINDS
     names = [] if arguments.quick or arguments.no_real else REAL
     scenes = [("city", [programs.city("cells-city", **CITY)])]
     scenes += [(name, models) for name in names if (models := real_data(name))]
-    made, drawn = [], []
+    made, drawn, pictures = [], [], []
     for name, models in scenes:
         out = programs.work / f"scene-cells-{name}"
         run([programs.path("hlod-build"), "--quiet", *map(str, models), str(out)])
         paths = {kind: path(programs, out, kind, frames) for kind in kinds}
-        alone = {at: replay(programs, out, paths[at[0]], at[1], "off") for at in points(kinds)}
         for pixels, cull in FACES[:1] if arguments.quick else FACES:
             what = f"{name}, {pixels} pixels, {cull} m"
             say(what)
             made.append([what, *prepare(programs, out, paths.values(), pixels, cull)])
             for kind, target in points(kinds):
-                with_cells = replay(programs, out, paths[kind], target, "cells")
-                drawn.append([f"{what}: {kind}, {target} ms", *compared(alone[kind, target], with_cells)])
-    text = machine() + "\n\n" + tables(made, drawn, frames)
+                ways = {way: replay(programs, out, paths[kind], target, way) for way in WAYS}
+                drawn.append([f"{name}: {kind}, {target} ms", *compared(ways)])
+        if (name, "walk") in PICTURES and arguments.write:
+            pictures.append(street(programs, out, name, paths["walk"]))
+    text = "\n\n".join([machine(), tables(made, drawn, frames), *pictures]) + "\n"
     print(text)
     if arguments.write:
         write_between_markers(DOCS / "cells.md", "cells", text)
@@ -80,55 +88,93 @@ def prepare(programs, out, paths, pixels, cull):
     ]
 
 
-def replay(programs, out, path, target, far_field):
-    result = programs.work / "cells-run"
+def replay(programs, out, path, target, far_field, every=EVERY, pops=("--pops",)):
+    result = programs.work / f"cells-run-{far_field}"
     run([programs.path("hlod-bench"), str(out), str(path), *CLOCK, "--quiet"]
-        + ["--target-ms", str(target), "--warm-up-frames", str(SETTLE)]
-        + ["--reference-every", str(EVERY), "--far-field", far_field, "--out", str(result)])
+        + ["--target-ms", str(target), "--warm-up-frames", str(SETTLE), *pops]
+        + ["--reference-every", str(every), "--far-field", far_field, "--out", str(result)])
     with open(result / "frames.csv", newline="") as file:
         frames = list(csv.DictReader(file))
     summary = json.loads((result / "summary.json").read_text())
-    looked = [frame for frame in frames if frame["flip_mean"]]
+    looked = [frame for frame in frames[::every] if frame["flip_mean"]]
     times = sorted(float(frame["frame_ms"]) for frame in frames)
 
     def mean(name, of=frames):
         return sum(float(frame[name]) for frame in of) / len(of)
 
+    def drawn(of):
+        return mean("triangles", of) + mean("face_triangles", of)
+
+    def pop(far):
+        of = [float(frame["pop_flip"]) for frame in frames if frame["pop_flip"] and frame["far_changed"] == far]
+        return sum(of) / len(of) if of else None
+
     return {
         "p95": times[int(0.95 * len(times))],
-        "triangles": mean("triangles") + mean("face_triangles"),
+        "triangles": drawn(frames),
+        "part": drawn(looked) / mean("reference_triangles", looked),
         "flip": mean("flip_mean", looked),
         "gaps": sum(int(frame["inner_gap_pixels"]) for frame in looked)
         / max(1, sum(int(frame["reference_pixels"]) for frame in looked)),
         "memory": max(float(frame["memory_bytes"]) for frame in frames),
         "frames": summary["far_field"]["frames_percent"],
+        "toggle": pop("0"),
+        "change": pop("1"),
     }
 
 
-def compared(alone, with_cells):
-    def both(name, form):
-        return f"{form(alone[name])} / {form(with_cells[name])}"
+def compared(ways):
+    def of(name, form):
+        return " / ".join(form(ways[way][name]) for way in WAYS)
+
+    def pop(value):
+        return "–" if value is None else f"{value:.4f}"
 
     return [
-        f"{with_cells['frames']:.0f}",
-        both("p95", "{:.1f}".format),
-        both("triangles", lambda number: f"{number / 1e3:.1f}"),
-        both("flip", "{:.4f}".format),
-        both("gaps", lambda part: f"{1e6 * part:.0f}"),
-        both("memory", lambda size: f"{size / 2**20:.0f}"),
+        f"{ways['cells']['frames']:.0f} / {ways['auto']['frames']:.0f}",
+        of("p95", "{:.1f}".format),
+        of("triangles", lambda number: f"{number / 1e3:.1f}"),
+        of("part", lambda part: f"{100 * part:.1f}"),
+        of("flip", "{:.4f}".format),
+        of("gaps", lambda part: f"{1e6 * part:.0f}"),
+        of("memory", lambda size: f"{size / 2**20:.0f}"),
+        f"{pop(ways['off']['toggle'])} / {pop(ways['cells']['change'])}",
     ]
+
+
+def street(programs, out, name, path):
+    """The first frame of a walk by the hierarchy alone, with cells, and of the leaves, as one picture."""
+    target = TARGETS_MS[-1]
+    shown = []
+    for way in ["off", "cells"]:
+        # No other frame is looked at.
+        replay(programs, out, path, target, way, every=FRAMES, pops=())
+        report = (programs.work / f"cells-run-{way}" / "report.html").read_text()
+        shown.append([base64.b64decode(text) for text in re.findall(JPEG, report)[:2]])
+    (alone, leaves), (with_cells, _) = shown
+    files = []
+    for number, jpeg in enumerate([alone, with_cells, leaves]):
+        files.append(programs.work / f"cells-street-{number}.jpg")
+        files[-1].write_bytes(jpeg)
+    (DOCS / "cells").mkdir(exist_ok=True)
+    run([programs.path("examples/tile_pictures"), str(DOCS / "cells" / f"{name}.jpg"), *map(str, files)])
+    caption = f"{name}, {target} ms: the hierarchy alone, with cells, and all leaves"
+    return f"![{caption}](cells/{name}.jpg)\n\n*{caption}.*"
 
 
 def tables(made, drawn, frames):
     head = ["cells", "number", "a minute", "faces each", "triangles a face", "KB a face"]
-    of_runs = ["run", "% of frames", "ms, p95", "thousand triangles", "FLIP", "gaps, millionths", "MiB"]
+    of_runs = ["run", "% of frames", "ms, p95", "thousand triangles", "% of those in the frustum"]
+    of_runs += ["FLIP", "gaps, millionths", "MiB", "toggle / change of cell, FLIP"]
     return (
         "Made along a walk and a drive, cells of 4 m:\n\n"
         + table(head, made)
-        + f"\nThe default policy over {frames} frames, by the model clock, 1280 × 720; *hierarchy alone / with "
-        "cells*, and in how many frames a cell was there. Gaps are pixels with background where the leaves have surface that no outline explains:\n\n"
+        + f"\nThe default policy over {frames} frames, by the model clock, 1280 × 720: *`--far-field off` / `cells` / "
+        "`auto`*, and in how many frames a cell was drawn by the last two. *Those in the frustum* are the source's "
+        "triangles. Gaps are pixels with background where the leaves have surface that no outline explains. Changes are "
+        "means over frames in which levels toggled (`off`), and in which the cell changed (`cells`):\n\n"
         + table(of_runs, drawn)
-    )
+    ).strip()
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 //! How far what is drawn is from what could be.
 
-use glam::DVec3;
 use image::RgbaImage;
 
 use crate::Result;
 use crate::camera::View;
+use crate::engine::FarShown;
 
 /// How far the picture of a frame is from that of the leaves alone.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -18,6 +18,8 @@ pub struct Accuracy {
     /// Structural similarity, 1 where there is no difference; `None` of pictures smaller than its
     /// window.
     pub ssim: Option<f64>,
+    /// Triangles of the leaves in view.
+    pub reference_triangles: u64,
     /// Pixels with surface in the picture of the leaves.
     pub reference_pixels: u64,
     /// Of these, pixels with background in that of the frame.
@@ -27,8 +29,8 @@ pub struct Accuracy {
     pub inner_gap_pixels: u64,
     /// Pixels with surface where the leaves have background.
     pub extra_pixels: u64,
-    /// FLIP between the picture and the same view with the levels of the frame before: the pop
-    /// that a user sees. `None` where nothing toggled.
+    /// FLIP between the picture and the same view with the levels of the frame before, and the cell of then:
+    /// the pop that a user sees. `None` where neither changed.
     pub pop_flip: Option<f64>,
 }
 
@@ -39,11 +41,12 @@ impl Accuracy {
     }
 
     /// Its columns of `frames.csv`.
-    pub(super) const COLUMNS: [&str; 9] = [
+    pub(super) const COLUMNS: [&str; 10] = [
         "flip_mean",
         "flip_p95",
         "psnr_db",
         "ssim",
+        "reference_triangles",
         "reference_pixels",
         "gap_pixels",
         "inner_gap_pixels",
@@ -52,13 +55,14 @@ impl Accuracy {
     ];
 
     /// Its fields in the order of the columns.
-    pub(super) fn fields(&self) -> [String; 9] {
+    pub(super) fn fields(&self) -> [String; 10] {
         let optional = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
         [
             self.flip_mean.to_string(),
             self.flip_p95.to_string(),
             self.psnr_db().to_string(),
             optional(self.ssim),
+            self.reference_triangles.to_string(),
             self.reference_pixels.to_string(),
             self.gap_pixels.to_string(),
             self.inner_gap_pixels.to_string(),
@@ -70,7 +74,7 @@ impl Accuracy {
 
 /// Looks at frames beside a run, which it does not change.
 pub trait FrameInspector {
-    /// Whether it inspects this frame of the path, in which levels toggled or not.
+    /// Whether it inspects this frame of the path, in which levels toggled, or what is far changed, or not.
     fn wants(&self, index: usize, toggled: bool) -> bool;
 
     /// Looks at a frame that is over.
@@ -86,14 +90,14 @@ pub struct FrameSample<'a> {
     pub view: &'a View,
     /// What was drawn.
     pub front: &'a [u32],
-    /// Faces of cells that were drawn, by their numbers.
-    pub faces: &'a [u32],
-    /// The box at which nodes were cut, outside of which faces were drawn.
-    pub cull_box: Option<[DVec3; 2]>,
+    /// What was drawn from the faces of cells.
+    pub far: &'a FarShown,
     /// The rest of the front, which was not drawn since this hides it.
     pub hidden: &'a [u32],
-    /// The front of the frame before, where levels toggled since.
+    /// The front of the frame before, where levels toggled since, or what is far is drawn from another cell.
     pub before: Option<&'a [u32]>,
+    /// What was drawn from the faces of another cell then, or was not.
+    pub far_before: Option<&'a FarShown>,
     /// The picture, alpha 0 where nothing was drawn; `None` where the run drew none.
     pub drawn: Option<RgbaImage>,
 }

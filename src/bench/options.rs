@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::engine::Policy;
 use crate::engine::policies::{POLICIES, PolicyKind, Settings};
+use crate::engine::{FarFieldMode, Policy};
 use crate::render::content::TextureFormat;
 use crate::runtime::residency::ResidencyOptions;
 use crate::{Error, Result};
@@ -25,15 +25,19 @@ pub struct BenchOptions {
     pub warm_up_frames: u64,
     /// Whether what is hidden by what is before it is left out.
     pub cull_hidden: bool,
-    /// Whether what is far is drawn from the faces of cells, where the eye is in one.
-    // Left away where it is not so, so that summaries of before can be compared.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub far_field: bool,
+    /// What is drawn of what is far.
+    // Left away where it is the hierarchy, so that summaries of before can be compared.
+    #[serde(skip_serializing_if = "is_off")]
+    pub far_field: FarFieldMode,
     /// How textures are stored, as far as they [can be](TextureFormat::of_picture); memory is counted
     /// so, drawn or not. RGBA8.
     pub textures: TextureFormat,
     /// Seed of the model clock's noise and stalls.
     pub seed: u64,
+}
+
+fn is_off(mode: &FarFieldMode) -> bool {
+    *mode == FarFieldMode::Off
 }
 
 impl Default for BenchOptions {
@@ -46,7 +50,7 @@ impl Default for BenchOptions {
             size: Size::default(),
             warm_up_frames: 0,
             cull_hidden: true,
-            far_field: false,
+            far_field: FarFieldMode::Off,
             textures: TextureFormat::Rgba8,
             seed: 0,
         }

@@ -65,7 +65,7 @@ pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -
         engine.look_past(occluders);
     }
     if let Some(cells) = cells {
-        engine.draw_far_from(cells);
+        engine.draw_far_from(cells, options.far_field);
     }
     if options.cull_hidden {
         engine.cull_hidden(tree.near_plane().into());
@@ -92,12 +92,12 @@ pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -
             accuracy: None,
         };
         engine.logged(index as u64)?;
-        let toggled = record.report.toggles() > 0;
+        let toggled = record.report.toggles() > 0 || record.report.far_changed;
         if let Some(inspector) = inspector.as_mut().filter(|at| at.wants(index, toggled)) {
             let (front, before) = (engine.drawn().to_vec(), engine.front_before().to_vec());
             let hidden = engine.hidden();
-            let (faces, cull_box) = (engine.faces().to_vec(), engine.cull_box());
-            let faces = &faces[..];
+            let (far, far_before) = (engine.far_shown(), engine.far_shown_before());
+            let (far, far_before) = (&far, far_before.as_ref());
             let (front, before) = (&front[..], toggled.then_some(&before[..]));
             engine.inspect(&view, &mut |drawn| {
                 let (frame, hidden) = (record.frame, &hidden[..]);
@@ -105,10 +105,10 @@ pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -
                     frame,
                     view: &view,
                     front,
-                    faces,
-                    cull_box,
+                    far,
                     hidden,
                     before,
+                    far_before,
                     drawn,
                 };
                 record.accuracy = Some(inspector.inspect(sample)?);

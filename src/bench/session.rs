@@ -8,7 +8,7 @@ use super::{
     ModelOcclusions, Replay, Run, run,
 };
 use crate::camera::CameraPath;
-use crate::engine::{CostModel, NodeOcclusion, Occluders, Policy};
+use crate::engine::{CostModel, FarFieldMode, NodeOcclusion, Occluders, Policy};
 use crate::format::Scene;
 use crate::format::cells::{CELLS_FILE, Cells};
 use crate::loading::NodeFiles;
@@ -40,15 +40,21 @@ impl Session {
         Ok(Self { dir, scene, tree, occluders, occlusions, cells: None })
     }
 
-    /// The same with the cells that `hlod-build cells` made of it; fails where there are none, or those of
-    /// another build.
-    pub fn with_cells(self) -> Result<Self> {
+    /// Whether cells were made of it, or of an earlier build.
+    pub fn has_cells(&self) -> bool {
+        self.dir.join(CELLS_FILE).exists()
+    }
+
+    /// Reads the cells that `hlod-build cells` made of it; fails where there are none, or those of another
+    /// build.
+    pub fn read_cells(&mut self) -> Result<()> {
         let Some(cells) = Cells::read(&self.dir)? else {
             let what = "there are no cells; make some with `hlod-build cells`";
             return Err(Error::input(self.dir.join(CELLS_FILE), what));
         };
         cells.check_scene(&self.scene, &self.dir)?;
-        Ok(Self { cells: Some(Arc::new(cells)), ..self })
+        self.cells = Some(Arc::new(cells));
+        Ok(())
     }
 
     /// The output folder.
@@ -131,9 +137,9 @@ impl Session {
     /// Its cells, where what is far is drawn from them.
     fn cells_for(&self, options: &BenchOptions) -> Result<Option<Arc<Cells>>> {
         match (options.far_field, &self.cells) {
-            (false, _) => Ok(None),
-            (true, Some(cells)) => Ok(Some(Arc::clone(cells))),
-            (true, None) => Err(Error::Internal("cells are wanted and were not read".into())),
+            (FarFieldMode::Off, _) => Ok(None),
+            (_, Some(cells)) => Ok(Some(Arc::clone(cells))),
+            (_, None) => Err(Error::Internal("cells are wanted and were not read".into())),
         }
     }
 

@@ -150,6 +150,7 @@ pub fn summary(run: &Run, context: &Context) -> Value {
             "frames_percent": mean(of(|frame| f64::from(u8::from(frame.report.faces > 0)))) * 100.0,
             "faces_mean": mean(of(|frame| f64::from(frame.report.faces))),
             "triangles_mean": mean(of(|frame| frame.report.face_triangles as f64)),
+            "changes": frames.iter().filter(|frame| frame.report.far_changed).count(),
         },
         "visited_mean": mean(of(|frame| f64::from(frame.report.visited))),
         "nodes_mean": mean(of(|frame| f64::from(frame.report.nodes))),
@@ -160,7 +161,10 @@ pub fn summary(run: &Run, context: &Context) -> Value {
 
 /// How far the frames that were looked at are from the leaves.
 fn accuracy(frames: &[FrameRecord], reference: &ReferenceContext) -> Value {
-    let looked: Vec<&Accuracy> = frames.iter().filter_map(|f| f.accuracy.as_ref()).collect();
+    // Frames that were looked at for what changed in them are no fair part of all.
+    let every = usize::try_from(reference.every).unwrap_or(usize::MAX).max(1);
+    let looked: Vec<&Accuracy> =
+        frames.iter().step_by(every).filter_map(|f| f.accuracy.as_ref()).collect();
     let of = |field: fn(&Accuracy) -> f64| looked.iter().map(|&a| field(a)).collect::<Vec<f64>>();
     let spread = |values: Vec<f64>| {
         json!({
@@ -180,7 +184,11 @@ fn accuracy(frames: &[FrameRecord], reference: &ReferenceContext) -> Value {
     };
     let squared = of(|a| a.squared_error);
     let similar: Vec<f64> = looked.iter().filter_map(|a| a.ssim).collect();
-    let pops: Vec<f64> = looked.iter().filter_map(|a| a.pop_flip).collect();
+    let pops = |far_changed: bool| {
+        let of = frames.iter().filter(|frame| frame.report.far_changed == far_changed);
+        of.filter_map(|frame| frame.accuracy.as_ref()?.pop_flip).collect::<Vec<f64>>()
+    };
+    let (pops, far_pops) = (pops(false), pops(true));
     json!({
         "every": reference.every,
         "adapter": reference.adapter,
@@ -193,12 +201,16 @@ fn accuracy(frames: &[FrameRecord], reference: &ReferenceContext) -> Value {
             "min": psnr(percentile(&squared, 100.0)),
         },
         "ssim": { "mean": mean(similar.iter().copied()), "min": percentile(&similar, 0.0) },
+        "reference_triangles_mean": mean(of(|a| a.reference_triangles as f64)),
         "reference_pixels": surface,
         "gap_pixels": pixels(|a| a.gap_pixels),
         "inner_gap_pixels": pixels(|a| a.inner_gap_pixels),
         "extra_pixels": pixels(|a| a.extra_pixels),
         "pop_frames": pops.len(),
         "pop_flip": (!pops.is_empty()).then(|| spread(pops)),
+        // Where what is far changed, by another cell or none.
+        "far_pop_frames": far_pops.len(),
+        "far_pop_flip": (!far_pops.is_empty()).then(|| spread(far_pops)),
     })
 }
 
@@ -311,10 +323,11 @@ pub fn summary_text(summary: &Value) -> String {
         line(
             "far field",
             format!(
-                "{:.1} faces and {:.0} triangles a frame, in {:.0} % of frames",
+                "{:.1} faces and {:.0} triangles a frame, in {:.0} % of frames; {} changes of cell",
                 number("/far_field/faces_mean"),
                 number("/far_field/triangles_mean"),
                 number("/far_field/frames_percent"),
+                number("/far_field/changes"),
             ),
         );
     }
@@ -374,16 +387,13 @@ pub fn summary_text(summary: &Value) -> String {
                 number("/accuracy/extra_pixels/sum"),
             ),
         );
-        if number("/accuracy/pop_frames") > 0.0 {
-            line(
-                "pops",
-                format!(
-                    "FLIP {:.4} mean, {:.4} at worst in {} frames with toggles",
-                    number("/accuracy/pop_flip/mean"),
-                    number("/accuracy/pop_flip/max"),
-                    number("/accuracy/pop_frames"),
-                ),
-            );
+        for (key, what) in [("pop", "frames with toggles"), ("far_pop", "changes of cell")] {
+            let number = |at: &str| number(&format!("/accuracy/{key}_{at}"));
+            if number("frames") > 0.0 {
+                let (mean, most) = (number("flip/mean"), number("flip/max"));
+                let frames = number("frames");
+                line("pops", format!("FLIP {mean:.4} mean, {most:.4} at worst in {frames} {what}"));
+            }
         }
     }
     let broken = summary.pointer("/broken_files").and_then(Value::as_array);

@@ -61,13 +61,14 @@ pub fn prepare(
     let known = cells.cells.len();
     progress.begin(known + missing.len(), known);
     let mut capture = Capture::new(&session, options, adapter)?;
+    let kind = &kind(&cells);
     let dir = out.join(CELLS_DIR);
     std::fs::create_dir_all(&dir)
         .map_err(|error| Error::output(&dir, format!("cannot make the folder: {error}")))?;
     for part in missing.chunks(CELLS_BETWEEN) {
         let mut more = Vec::with_capacity(part.len());
         for &place in part {
-            more.push(cell(out, &mut capture, &session, place, options)?);
+            more.push(cell(out, &mut capture, &session, place, options, kind)?);
             progress.done();
         }
         cells.add(more);
@@ -91,7 +92,8 @@ fn earlier(out: &Path, session: &Session, options: &CellOptions) -> Result<Cells
         .map_err(|error| Error::Internal(format!("options without JSON form: {error}")))?;
     let scene = session.scene().fingerprint;
     let (cells, faces) = (Vec::new(), Vec::new());
-    let none = Cells { scene, parameters, size: options.cell_m, cells, faces };
+    let (size, texel) = (options.cell_m, 1.0 / options.focal_px());
+    let none = Cells { scene, parameters, size, texel, cells, faces };
     let Ok(Some(mut found)) = Cells::read(out) else { return Ok(none) };
     if (&found.scene, &found.parameters) != (&none.scene, &none.parameters) {
         return Ok(none);
@@ -102,6 +104,13 @@ fn earlier(out: &Path, session: &Session, options: &CellOptions) -> Result<Cells
     };
     found.retain(|faces| faces.iter().all(is_whole));
     Ok(found)
+}
+
+/// What names of faces end with: another for other options and another build, so that a run that dies
+/// leaves those that an earlier index knows.
+fn kind(cells: &Cells) -> String {
+    let made_with = cells.parameters.to_string();
+    format!("{:08x}", crc32fast::hash(&[cells.scene.as_slice(), made_with.as_bytes()].concat()))
 }
 
 /// Removes faces of cells that are no more. What cannot be removed does no harm.
@@ -122,6 +131,7 @@ fn cell(
     session: &Session,
     place: [i64; 3],
     options: &CellOptions,
+    kind: &str,
 ) -> Result<(Cell, Vec<Face>)> {
     let min = DVec3::from_array(place.map(|at| at as f64)) * options.cell_m;
     let max = min + DVec3::splat(options.cell_m);
@@ -162,7 +172,7 @@ fn cell(
     for (made, direction) in made.into_iter().zip(0..) {
         let Some(made) = made else { continue };
         let [i, j, k] = place;
-        let file = format!("c{i}_{j}_{k}-{direction}.glb");
+        let file = format!("c{i}_{j}_{k}-{direction}-{kind}.glb");
         let label = NodeLabel { id: direction, level: 0 };
         let bytes = write_glb(&made.mesh, session.scene().up, label)?;
         write_beside(&out.join(CELLS_DIR).join(&file), &bytes)?;

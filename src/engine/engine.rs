@@ -2,16 +2,14 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use glam::DVec3;
-
 use super::margin::Margin;
 use super::predict::predict;
 use super::settling::Settling;
 use super::steady::Steady;
 use super::{
-    Backend, CostModel, FarField, FrameEstimate, FrameInput, FrameOutcome, FrameReport, FrontCheck,
-    FrontLoad, HiddenNodes, Inspect, Load, Occluders, Policy, PredictedView, Residents, SeenAreas,
-    Selection, ToggleCauses, Visibility,
+    Backend, CostModel, FarField, FarFieldMode, FarShown, FrameEstimate, FrameInput, FrameOutcome,
+    FrameReport, FrontCheck, FrontLoad, HiddenNodes, Inspect, Load, Occluders, Policy,
+    PredictedView, Residents, SeenAreas, Selection, ToggleCauses, Visibility,
 };
 use crate::camera::{Pose, View};
 use crate::format::cells::Cells;
@@ -178,12 +176,12 @@ impl<'a> Engine<'a> {
         self.seen.hidden = Some(hidden);
     }
 
-    /// Draws what is far from the faces of cells. Residency must know of them:
+    /// Draws what is far from the faces of cells, or where that pays. Residency must know of them:
     /// [`Sizes::with_faces`](crate::runtime::residency::Sizes::with_faces).
-    pub fn draw_far_from(&mut self, cells: Arc<Cells>) {
+    pub fn draw_far_from(&mut self, cells: Arc<Cells>, mode: FarFieldMode) {
         let nodes = self.seen.tree.len();
         self.seen.residents.grow(nodes + cells.faces.len());
-        self.far_field = Some(FarField::new(cells, nodes as u32));
+        self.far_field = FarField::new(cells, nodes as u32, mode);
     }
 
     /// Draws a frame. The next begins `interval_s` seconds after this one began, at the earliest.
@@ -214,7 +212,7 @@ impl<'a> Engine<'a> {
         let before = self.backend.now_ms();
         let dt_s = self.seen.dt_s;
         if let Some(seen) = &mut self.seen.seen {
-            seen.look(view, dt_s);
+            seen.look(&view.within(None), dt_s);
         }
         if let Some(hidden) = &mut self.seen.hidden {
             hidden.begin_frame(view, dt_s);
@@ -233,10 +231,11 @@ impl<'a> Engine<'a> {
         })?;
         self.set_requests(view, &mut report)?;
         self.backend.priorities_set();
+        self.weigh_far(view);
 
         self.drawn_with_faces.clone_from(&self.drawn);
         if let Some(far_field) = &self.far_field {
-            self.drawn_with_faces.extend(far_field.drawn());
+            self.drawn_with_faces.extend(&far_field.shown().faces);
         }
         let drawn = self.backend.draw(&self.drawn_with_faces, view)?;
         (report.draw_ms, report.gpu_ms) = (drawn.draw_ms, drawn.gpu_ms);
@@ -266,7 +265,18 @@ impl<'a> Engine<'a> {
             *at = far_field.expected(at);
         }
         seen.far_ms = seen.steady.costs().added_ms(&far_field.load(view, self.covered));
-        view.within(far_field.cull_box())
+        view.within(far_field.shown().cull_box)
+    }
+
+    /// Weighs, now and then, whether faces pay.
+    fn weigh_far(&mut self, view: &View) {
+        let (Some(far_field), seen) = (&mut self.far_field, &self.seen) else { return };
+        if far_field.is_due(seen.dt_s, seen.hidden.as_ref()) {
+            let whole = view.within(None);
+            let budget_ms = seen.steady.budget_ms(seen.target_ms);
+            let frame = FrameInput { budget_ms, ..seen.from(&whole) };
+            far_field.weigh(&frame, &self.selection.front, self.covered);
+        }
     }
 
     /// Takes over what arrived and lets go of what left.
@@ -337,14 +347,14 @@ impl<'a> Engine<'a> {
         &self.drawn
     }
 
-    /// Faces of cells that it drew.
-    pub fn faces(&self) -> &[u32] {
-        &self.drawn_with_faces[self.drawn.len()..]
+    /// What it showed of what is far.
+    pub fn far_shown(&self) -> FarShown {
+        self.far_field.as_ref().map(|far_field| far_field.shown().clone()).unwrap_or_default()
     }
 
-    /// The cull box at which the last frame cut its nodes, where faces show what is outside of it.
-    pub fn cull_box(&self) -> Option<[DVec3; 2]> {
-        self.far_field.as_ref()?.cull_box()
+    /// What the frame before showed of it, where that was of another cell, or was the hierarchy alone.
+    pub fn far_shown_before(&self) -> Option<FarShown> {
+        self.far_field.as_ref()?.shown_before().cloned()
     }
 
     /// Nodes of its front that it did not draw, since those drawn hide them.
@@ -440,7 +450,8 @@ impl<'a> Engine<'a> {
         let frame = self.seen.from(view);
         report.toggle_causes = ToggleCauses::of(&frame, &self.toggles, changes);
         if let Some(far_field) = &self.far_field {
-            report.faces = far_field.drawn().len() as u32;
+            report.faces = far_field.shown().faces.len() as u32;
+            report.far_changed = far_field.shown_before().is_some();
             report.face_triangles = far_field.triangles();
         }
         report.finer_resident = self.drawn.iter().any(|&node| frame.can_refine(node));

@@ -31,7 +31,7 @@ pub use backend::{Backend, Drawn, Inspect};
 pub use check_front::{FrontCheck, FrontFault, FrontRule};
 pub use cost_model::{CostModel, Estimate, Load, Prices};
 pub use engine::{Engine, lock};
-pub use far_field::FarField;
+pub use far_field::{FarField, FarFieldMode, FarShown};
 pub use frame_load::{FrontLoad, geometry_load};
 pub use occlusion::{HiddenNodes, NodeOcclusion, Occluders, SeenAreas};
 pub use policy::{FrameEstimate, FrameInput, FrameOutcome, Policy, PredictedView, Selection};

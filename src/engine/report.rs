@@ -47,6 +47,9 @@ pub struct FrameReport {
     pub faces: u32,
     /// Triangles of these.
     pub face_triangles: u64,
+    /// Whether what is far is drawn from another cell than in the frame before, or from one for the first
+    /// time, or no more.
+    pub far_changed: bool,
     /// Nodes visited by selection.
     pub visited: u32,
     /// Of these, nodes outside of the view.

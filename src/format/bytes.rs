@@ -11,6 +11,8 @@ pub(super) struct CutShort {
     found: usize,
 }
 
+impl std::error::Error for CutShort {}
+
 impl fmt::Display for CutShort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { what, at, expected, found } = self;

@@ -23,6 +23,7 @@ mod glb_schema;
 #[cfg(test)]
 mod glb_tests;
 mod glb_write;
+mod index_file;
 mod node_mesh;
 mod output_dir;
 #[cfg(test)]

@@ -2,36 +2,26 @@
 
 use std::path::Path;
 
+use super::SCENE_FILE;
 use super::bytes::{Cursor, CutShort};
+use super::index_file::NotWhole;
 use super::scene::{BlockInfo, Node, Scene, SharedTexture};
 use super::scene_check::SceneDefect;
-use super::scene_write::{FLAG_TEXTURED, FLAG_Z_UP};
+use super::scene_write::{FLAG_TEXTURED, FLAG_Z_UP, SCENE};
 use super::sink::NONE;
-use super::{SCENE_FILE, SCENE_MAGIC, SCENE_VERSION};
 use crate::mesh::UpAxis;
 use crate::{Error, Result};
 
-/// Bytes of magic, version, flags and length.
-const PREFIX: usize = 24;
 /// Bytes of a node with an empty file name and no shared textures.
 const NODE_SIZE: usize = 188;
 
 /// Why bytes are not a scene.
 #[derive(Debug, thiserror::Error)]
 enum Unreadable {
-    #[error("not a scene file: expected it to begin with {SCENE_MAGIC:02x?}, found {0:02x?}")]
-    Magic(Vec<u8>),
-    #[error(
-        "scene format version: expected {SCENE_VERSION}, found {0}; build the scene again with \
-         this version, or use the version that built it"
-    )]
-    Version(u32),
-    #[error("expected {expected} bytes, found {found}: the file is truncated or was appended to")]
-    Length { expected: u64, found: usize },
-    #[error("damaged: expected CRC-32 {expected:08x}, found {found:08x}")]
-    Checksum { expected: u32, found: u32 },
+    #[error(transparent)]
+    NotWhole(#[from] NotWhole),
     #[error("truncated: {0}")]
-    CutShort(CutShort),
+    CutShort(#[from] CutShort),
     #[error("flags: expected only bits of {known:#x}, found {0:#x}", known = FLAG_TEXTURED | FLAG_Z_UP)]
     Flags(u32),
     #[error("{what} at byte {at}: expected UTF-8, found byte {found:#04x}")]
@@ -54,12 +44,6 @@ fn list(defects: &[SceneDefect]) -> String {
     }
 }
 
-impl From<CutShort> for Unreadable {
-    fn from(cut: CutShort) -> Self {
-        Self::CutShort(cut)
-    }
-}
-
 impl Scene {
     /// Reads the scene of an output folder.
     pub fn read(dir: &Path) -> Result<Self> {
@@ -77,35 +61,10 @@ impl Scene {
 }
 
 fn parse(bytes: &[u8]) -> Result<Scene, Unreadable> {
-    let mut prefix = Cursor::new(bytes);
-    let magic = &bytes[..bytes.len().min(SCENE_MAGIC.len())];
-    // A file that is cut within the magic is called truncated, not foreign.
-    if !SCENE_MAGIC.starts_with(magic) || magic.is_empty() {
-        return Err(Unreadable::Magic(magic.to_vec()));
-    }
-    prefix.take(SCENE_MAGIC.len() as u64, "magic")?;
-    let version = prefix.u32("version")?;
-    if version != SCENE_VERSION {
-        return Err(Unreadable::Version(version));
-    }
-    let flags = prefix.u32("flags")?;
-    let expected = prefix.u64("file length")?;
-    if expected != bytes.len() as u64 {
-        return Err(Unreadable::Length { expected, found: bytes.len() });
-    }
-    let (body, seal) = match bytes.split_last_chunk::<4>() {
-        Some((body, seal)) if body.len() >= PREFIX => (body, u32::from_le_bytes(*seal)),
-        _ => return Err(Unreadable::Length { expected: PREFIX as u64 + 4, found: bytes.len() }),
-    };
-    let found = crc32fast::hash(body);
-    if found != seal {
-        return Err(Unreadable::Checksum { expected: seal, found });
-    }
+    let (flags, mut cursor) = SCENE.open(bytes)?;
     if flags & !(FLAG_TEXTURED | FLAG_Z_UP) != 0 {
         return Err(Unreadable::Flags(flags));
     }
-    let mut cursor = Cursor::new(body);
-    cursor.take(PREFIX as u64, "header")?;
     contents(&mut cursor, flags)
 }
 

@@ -1,10 +1,9 @@
 //! Writes `scene.hlod`.
 //!
-//! All little-endian; a text is its length in bytes as u32 and then UTF-8; an absent index is
+//! In an [`IndexFile`], flags 1: textured, 2: Z is up. All little-endian; a text is its length in bytes as u32 and then UTF-8; an absent index is
 //! `u32::MAX`.
 //!
 //! ```text
-//! magic [u8; 8] · version u32 · flags u32 (1: textured, 2: Z is up) · file length u64
 //! fingerprint [u8; 32] · bounding box min and max [f64; 6] · roots u32
 //! parameters text (JSON)
 //! count u32 · shared textures: file name text · width u32 · height u32 · bytes u64
@@ -16,9 +15,9 @@
 //!             texels, shared texels u64 · origin [f64; 3] · file name text · file bytes u64
 //!             file CRC-32 u32 · count u32 · indices of shared textures u32
 //!             count u32 · own pictures: width u32 · height u32
-//! CRC-32 u32 of all that precedes
 //! ```
 
+use super::index_file::IndexFile;
 use super::scene::{Node, Scene};
 use super::sink::{NONE, Sink};
 use super::{SCENE_MAGIC, SCENE_VERSION};
@@ -29,8 +28,14 @@ use crate::{Error, Result};
 pub(super) const FLAG_TEXTURED: u32 = 1;
 /// Set where Z is up, clear where Y is.
 pub(super) const FLAG_Z_UP: u32 = 2;
-/// Where the length of the file stands.
-const LENGTH_AT: usize = 16;
+
+pub(super) const SCENE: IndexFile = IndexFile {
+    magic: SCENE_MAGIC,
+    version: SCENE_VERSION,
+    what: "a scene file",
+    version_of: "scene format version",
+    then: "build the scene again with this version, or use the version that built it",
+};
 
 impl Scene {
     /// The bytes of `scene.hlod`.
@@ -42,13 +47,9 @@ impl Scene {
             let first = defects.first().map(ToString::to_string).unwrap_or_default();
             return Err(Error::Internal(format!("unsound scene: {first}")));
         };
-        let mut out = Sink(Vec::with_capacity(256 + 256 * self.nodes.len()));
-        out.0.extend(SCENE_MAGIC);
-        out.u32(SCENE_VERSION);
         let textured = if self.is_textured() { FLAG_TEXTURED } else { 0 };
         let z_up = if self.up == UpAxis::Z { FLAG_Z_UP } else { 0 };
-        out.u32(textured | z_up);
-        out.u64(0); // the length, once it is known
+        let mut out = SCENE.begin(textured | z_up, 256 + 256 * self.nodes.len());
         out.0.extend(self.fingerprint);
         out.f64s(&min);
         out.f64s(&max);
@@ -71,11 +72,7 @@ impl Scene {
         for node in &self.nodes {
             out.node(node)?;
         }
-        let mut bytes = out.0;
-        let length = bytes.len() as u64 + 4;
-        bytes[LENGTH_AT..LENGTH_AT + 8].copy_from_slice(&length.to_le_bytes());
-        bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
-        Ok(bytes)
+        Ok(IndexFile::end(out))
     }
 }
 

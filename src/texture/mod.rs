@@ -42,7 +42,7 @@ pub use bake::{BakeClasses, BakePlan, BakeReason, BakedMesh, Seams};
 pub use block::{BlockTextures, TextureOptions, texture_factors};
 pub use cache::TextureCache;
 #[cfg(feature = "render")]
-pub(crate) use face_picture::face_picture;
+pub(crate) use face_picture::{FacePicture, Patch, face_picture};
 pub use node::{AppendedSkirts, TexturedNode};
 pub use plan::{TexturePlan, TextureUse};
 pub use shared::{SharedFile, SharedTextures};

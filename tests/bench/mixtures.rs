@@ -7,6 +7,7 @@ use glam::DVec3;
 use hlod::bench::{Accuracy, FrameInspector, FrameSample, Reference, Session, SilhouetteTolerance};
 use hlod::camera::{Ground, PathKind, Pose, View, from_angles, make_path};
 use hlod::city::{CityOptions, TextureSize};
+use hlod::engine::FarShown;
 use hlod::mesh::UpAxis;
 use hlod::random::Random;
 use hlod::render::RenderOptions;
@@ -134,10 +135,10 @@ fn inspect(reference: &mut Reference, pose: &Pose, front: &[u32]) -> Accuracy {
         frame: 0,
         view: &view,
         front,
-        faces: &[],
-        cull_box: None,
+        far: &FarShown::default(),
         hidden: &[],
         before: None,
+        far_before: None,
         drawn: None,
     };
     reference.inspect(sample).unwrap()

@@ -19,11 +19,12 @@ const INPUT: i32 = 3;
 const NO_ADAPTER: i32 = 5;
 
 /// The columns that looking at frames fills.
-const COLUMNS: [&str; 9] = [
+const COLUMNS: [&str; 10] = [
     "flip_mean",
     "flip_p95",
     "psnr_db",
     "ssim",
+    "reference_triangles",
     "reference_pixels",
     "gap_pixels",
     "inner_gap_pixels",

@@ -5,5 +5,5 @@ mod plan;
 mod table;
 
 pub use figures::{FIGURES, Figure, Inspected, PolicyRun};
-pub use plan::{ORACLE, PoliciesPlan, RunKey};
+pub use plan::{ORACLE, PoliciesPlan, RunKey, WITH_CELLS};
 pub use table::{Interval, PoliciesTable};

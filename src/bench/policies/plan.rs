@@ -2,12 +2,16 @@
 
 use crate::bench::{BenchOptions, ClockConstants, PolicyChoice};
 use crate::camera::PathKind;
+use crate::engine::FarFieldMode;
 use crate::engine::policies::{POLICIES, PolicyKind, Settings};
 use crate::{Error, Result};
 
 /// The name of what policies are compared with: the first of the table with all that it asks for
 /// in memory at the next frame, however large.
 pub const ORACLE: &str = "oracle";
+
+/// What is added to the name of a policy where what is far is drawn from the faces of cells.
+pub const WITH_CELLS: &str = " with cells";
 
 /// Bytes a millisecond at which all is there at once.
 const AT_ONCE: f64 = 1e12;
@@ -17,6 +21,8 @@ const AT_ONCE: f64 = 1e12;
 pub struct PoliciesPlan {
     /// Names of policies.
     pub policies: Vec<String>,
+    /// Run each with the cells of the scene as well.
+    pub with_cells: bool,
     /// Kinds of paths.
     pub paths: Vec<PathKind>,
     /// Routes, noise and stalls: seeds from 0.
@@ -34,7 +40,7 @@ pub struct PoliciesPlan {
 /// What tells a run from the others over its scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunKey {
-    /// The name of the policy, or [`ORACLE`].
+    /// The name of the policy, with [`WITH_CELLS`] or without, or [`ORACLE`].
     pub policy: String,
     /// The path.
     pub path: PathKind,
@@ -64,11 +70,15 @@ impl PoliciesPlan {
 
     /// All runs over one scene: by path, seed and target, and for each the policies and the oracle.
     pub fn runs(&self) -> Vec<RunKey> {
+        let with_cells = |name: &String| [name.clone(), format!("{name}{WITH_CELLS}")];
+        let ways = if self.with_cells { 2 } else { 1 };
+        let names: Vec<String> =
+            self.policies.iter().flat_map(|name| with_cells(name).into_iter().take(ways)).collect();
         let mut runs = Vec::new();
         for &path in &self.paths {
             for seed in 0..self.seeds {
                 for &target_ms in &self.targets_ms {
-                    let names = self.policies.iter().map(String::as_str).chain([ORACLE]);
+                    let names = names.iter().map(String::as_str).chain([ORACLE]);
                     runs.extend(names.map(|policy| RunKey {
                         policy: policy.to_owned(),
                         path,
@@ -88,12 +98,17 @@ impl PoliciesPlan {
         clock: &ClockConstants,
     ) -> Result<(BenchOptions, ClockConstants)> {
         let is_oracle = run.policy == ORACLE;
-        let name = if is_oracle { POLICIES[0].name } else { run.policy.as_str() };
+        let (name, far_field) = match run.policy.strip_suffix(WITH_CELLS) {
+            _ if is_oracle => (POLICIES[0].name, FarFieldMode::Off),
+            Some(name) => (name, FarFieldMode::Cells),
+            None => (run.policy.as_str(), FarFieldMode::Off),
+        };
         let mut options = BenchOptions {
             target_ms: run.target_ms,
             policy: PolicyChoice::new(name, &Settings::new())?,
             seed: run.seed,
             warm_up_frames: self.warm_up_frames,
+            far_field,
             ..self.options.clone()
         };
         let mut clock = *clock;
@@ -115,6 +130,7 @@ mod tests {
     fn plan() -> PoliciesPlan {
         PoliciesPlan {
             policies: vec!["lakhia".into(), "best-first".into()],
+            with_cells: false,
             paths: vec![PathKind::Walk, PathKind::Rise],
             seeds: 2,
             targets_ms: vec![10.0, 30.0],
@@ -137,6 +153,19 @@ mod tests {
             let unbounded = options.residency.max_memory_bytes > 1 << 60;
             assert_eq!(unbounded, run.policy == ORACLE);
             assert_eq!(clock.load_bytes_per_ms == AT_ONCE, unbounded);
+        }
+    }
+
+    #[test]
+    fn each_policy_runs_with_cells_where_that_is_asked_for() {
+        let plan = PoliciesPlan { with_cells: true, ..plan() };
+        let runs = plan.runs();
+        assert_eq!(runs.len(), (2 * 2 + 1) * 2 * 2 * 2);
+        for run in &runs {
+            let (options, _) = plan.settings(run, &ClockConstants::default()).unwrap();
+            let uses_cells = options.far_field == FarFieldMode::Cells;
+            assert_eq!(uses_cells, run.policy.ends_with(" with cells"));
+            assert!(run.policy == ORACLE || run.policy.starts_with(options.policy.name()));
         }
     }
 

@@ -8,6 +8,7 @@ use image::{GrayImage, Luma, Rgb, RgbImage, RgbaImage};
 use super::accuracy::{Accuracy, FrameInspector, FrameSample, ReferenceContext, WorstFrame};
 use super::session::Session;
 use crate::camera::View;
+use crate::engine::FarShown;
 use crate::picture_error::{Gaps, PIXELS_PER_DEGREE, flip, mean_squared_error, ssim};
 use crate::render::RenderOptions;
 use crate::render::content::TextureFormat;
@@ -73,17 +74,22 @@ impl Reference {
         Ok(Self { fronts, ..self })
     }
 
-    /// A front beside the faces of a frame.
-    fn render_front(&mut self, front: &[u32], frame: &FrameSample<'_>) -> Result<RgbaImage> {
+    /// A front beside faces, as they are seen in a frame.
+    fn render_front(
+        &mut self,
+        front: &[u32],
+        far: &FarShown,
+        frame: &FrameSample<'_>,
+    ) -> Result<RgbaImage> {
         let renderer = self.fronts.as_mut().unwrap_or(&mut self.renderer);
-        renderer.cut_at(frame.cull_box);
-        let drawn: Vec<u32> = front.iter().chain(frame.faces).copied().collect();
+        renderer.cut_at(far.cull_box);
+        let drawn: Vec<u32> = front.iter().chain(&far.faces).copied().collect();
         let picture = renderer.render(&drawn, &frame.view.pose);
         renderer.cut_at(None);
         picture
     }
 
-    /// Inspects every frame in which levels toggled as well.
+    /// Inspects every frame in which levels toggled, or what is far changed, as well.
     pub fn with_every_toggle(mut self) -> Self {
         self.every_toggle = true;
         self
@@ -133,9 +139,12 @@ impl FrameInspector for Reference {
         let pose = &view.pose;
         let drawn = match &sample.drawn {
             Some(drawn) => drawn.clone(),
-            None => self.render_front(front, &sample)?,
+            None => self.render_front(front, sample.far, &sample)?,
         };
         let leaves = seen(self.renderer.tree(), &self.leaves, view);
+        let tree = self.renderer.tree();
+        let triangles = leaves.iter().map(|&leaf| u64::from(tree.node(leaf).triangles));
+        let triangles: u64 = triangles.sum();
         let reference = self.renderer.render(&leaves, pose)?;
         let gaps = Gaps::between(&surface(&reference), &surface(&drawn)).ok_or_else(other_size)?;
         let inner = if gaps.gaps.is_empty() {
@@ -156,6 +165,7 @@ impl FrameInspector for Reference {
             flip_p95: map.percentile(95.0),
             squared_error: mean_squared_error(expected, picture).ok_or_else(other_size)?,
             ssim: ssim(expected, picture),
+            reference_triangles: triangles,
             reference_pixels: gaps.reference_pixels,
             gap_pixels: gaps.gaps.len() as u64,
             inner_gap_pixels: inner.len() as u64,
@@ -163,8 +173,14 @@ impl FrameInspector for Reference {
             pop_flip: None,
         };
         if let Some(before) = before {
+            // Where another part of the hierarchy was drawn than now, all of it was there.
+            let far = sample.far_before.unwrap_or(sample.far);
+            let front = match sample.far_before {
+                Some(_) => &[before, front].concat(),
+                None => front,
+            };
             let before = front_before(self.renderer.tree(), before, front);
-            let before = opaque(&self.render_front(&before, &sample)?);
+            let before = opaque(&self.render_front(&before, far, &sample)?);
             let pop = flip(&before, picture, PIXELS_PER_DEGREE).ok_or_else(other_size)?;
             accuracy.pop_flip = Some(pop.mean());
         }

@@ -144,6 +144,7 @@ fn frames_that_were_compared_with_the_leaves_have_figures_and_the_worst_pictures
             flip_p95: 0.1,
             squared_error: 3.0,
             ssim: Some(0.97),
+            reference_triangles: 9_000,
             reference_pixels: 50_000,
             gap_pixels: 7,
             inner_gap_pixels: 1,

@@ -13,6 +13,7 @@ use hlod::bench::{
     Sweep, check_output, compare, summary, summary_text, write_run,
 };
 use hlod::camera::{self, CameraPath, DEFAULT_FPS, Ground, PathKind};
+use hlod::engine::FarFieldMode;
 use hlod::{Error, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use policies::PoliciesArgs;
@@ -228,9 +229,8 @@ fn replay_once(arguments: &RunArgs) -> Result<(serde_json::Value, Option<Error>)
     let constants = arguments.constants.as_deref().map(ClockConstants::read).transpose()?;
     let options = arguments.options()?;
     options.check()?;
-    if options.far_field {
-        session = session.with_cells()?;
-    }
+    let options =
+        BenchOptions { far_field: far_field(&mut session, options.far_field)?, ..options };
     check_output(&arguments.out)?;
     let bar = Bar::new(arguments.quiet, path.frames.len());
     let job = Job { arguments, session: &session, path: &path, options, constants, bar: &bar };
@@ -252,6 +252,23 @@ fn replay_once(arguments: &RunArgs) -> Result<(serde_json::Value, Option<Error>)
         Error::input(dir, format!("the run went on without {files} {what} {first}"))
     });
     Ok((summary, unusable))
+}
+
+/// Reads cells where they are wanted. Where they are drawn only if they pay, none are needed, and what
+/// cannot be used is told of.
+fn far_field(session: &mut Session, mode: FarFieldMode) -> Result<FarFieldMode> {
+    match mode {
+        FarFieldMode::Off => return Ok(mode),
+        FarFieldMode::Auto if !session.has_cells() => return Ok(FarFieldMode::Off),
+        FarFieldMode::Cells => session.read_cells()?,
+        FarFieldMode::Auto => {
+            if let Err(error) = session.read_cells() {
+                eprintln!("hlod-bench: {error}; what is far is drawn from the hierarchy");
+                return Ok(FarFieldMode::Off);
+            }
+        }
+    }
+    Ok(mode)
 }
 
 /// What a run needs.
@@ -280,7 +297,7 @@ fn run(job: Job) -> Result<(Run, Context)> {
         },
         show_levels: arguments.show_levels,
         cull: arguments.cull,
-        cut: options.far_field.then_some(Side::Inside),
+        cut: (options.far_field != FarFieldMode::Off).then_some(Side::Inside),
         ..RenderOptions::default()
     };
     let tolerance = SilhouetteTolerance {
@@ -296,8 +313,9 @@ fn run(job: Job) -> Result<(Run, Context)> {
     let textures = arguments.textures.format().unwrap_or(suitable);
     let options = BenchOptions { textures, ..options };
     let reference = |every| {
-        Reference::new(session, &render, every, tolerance)?
-            .with_textures(session, &render, textures)
+        let reference = Reference::new(session, &render, every, tolerance)?;
+        let reference = if arguments.pops { reference.with_every_toggle() } else { reference };
+        reference.with_textures(session, &render, textures)
     };
     let mut reference = arguments.reference_every.map(reference).transpose()?;
     let inspector = reference.as_mut().map(|reference| reference as &mut dyn FrameInspector);

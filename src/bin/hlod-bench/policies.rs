@@ -34,6 +34,9 @@ pub struct PoliciesArgs {
     /// Which policies [default: all]
     #[arg(long = "policy", value_name = "NAME,NAME", value_delimiter = ',', value_parser = POLICIES.map(|kind| kind.name))]
     policies: Vec<String>,
+    /// Run each policy with the cells of the scenes as well: rows `with cells`
+    #[arg(long)]
+    with_cells: bool,
     /// Which paths
     #[arg(
         long,
@@ -114,7 +117,10 @@ pub fn policies(arguments: &PoliciesArgs) -> Result<()> {
     let bar = bar(arguments, plan.runs().len() * arguments.scenes.len());
     let mut table = PoliciesTable::default();
     for dir in &arguments.scenes {
-        let session = Session::open(dir)?;
+        let mut session = Session::open(dir)?;
+        if plan.with_cells {
+            session.read_cells()?;
+        }
         let ground = Ground::read(session.scene(), dir)?;
         let name = dir
             .file_name()
@@ -146,6 +152,7 @@ fn plan(arguments: &PoliciesArgs) -> PoliciesPlan {
     let policies = &arguments.policies;
     PoliciesPlan {
         policies: if policies.is_empty() { all() } else { policies.clone() },
+        with_cells: arguments.with_cells,
         paths: arguments.paths.clone(),
         seeds: arguments.seeds,
         targets_ms: arguments.targets.clone(),
@@ -158,7 +165,6 @@ fn plan(arguments: &PoliciesArgs) -> PoliciesPlan {
             },
             size: arguments.size,
             cull_hidden: arguments.visibility == Switch::On,
-            far_field: false,
             ..BenchOptions::default()
         },
     }
@@ -191,12 +197,13 @@ fn reference(
     session: &Session,
 ) -> Result<Option<hlod::bench::Reference>> {
     use hlod::bench::{Reference, SilhouetteTolerance};
-    use hlod::render::RenderOptions;
+    use hlod::render::{RenderOptions, Side};
     if arguments.reference_every == 0 {
         return Ok(None);
     }
     let tolerance = SilhouetteTolerance { pixels: 2.0, most_error_pixels: 8.0 };
-    let render = RenderOptions { size: arguments.size.0, ..RenderOptions::default() };
+    let cut = arguments.with_cells.then_some(Side::Inside);
+    let render = RenderOptions { size: arguments.size.0, cut, ..RenderOptions::default() };
     let reference = Reference::new(session, &render, arguments.reference_every, tolerance)?;
     Ok(Some(if arguments.pops { reference.with_every_toggle() } else { reference }))
 }

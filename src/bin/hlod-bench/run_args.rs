@@ -7,6 +7,7 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 use hlod::Result;
 use hlod::bench::{BenchOptions, Pace, PolicyChoice, Size};
+use hlod::engine::FarFieldMode;
 use hlod::engine::policies::{POLICIES, Settings};
 use hlod::render::content::TextureFormat;
 use hlod::runtime::residency::ResidencyOptions;
@@ -60,8 +61,9 @@ pub struct RunArgs {
     #[arg(long, value_enum, default_value_t = Switch::On, help_heading = "Selection")]
     pub visibility: Switch,
     /// What is drawn of what is far: `off`, the hierarchy; `cells`, the faces of the cell in which the eye is,
-    /// which `hlod-build cells` makes, and elsewhere the hierarchy
-    #[arg(long, value_enum, default_value_t = FarFieldArg::Off, help_heading = "Selection")]
+    /// which `hlod-build cells` makes, and elsewhere the hierarchy; `auto`, these faces where they are
+    /// expected to show a view better in the time that there is
+    #[arg(long, value_enum, default_value_t = FarFieldArg::Auto, help_heading = "Selection")]
     pub far_field: FarFieldArg,
 
     /// maxMemory: memory cap in bytes, loads in progress included; with KiB, MiB or GiB
@@ -97,6 +99,9 @@ pub struct RunArgs {
     /// FLIP, PSNR, SSIM, gaps, and the pop where levels toggled. N 1 or more
     #[arg(long, value_name = "N", conflicts_with = "show_levels", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Drawing")]
     pub reference_every: Option<u64>,
+    /// Draw the frames before and after every toggle, and every change of cell, as well
+    #[arg(long, requires = "reference_every", help_heading = "Drawing")]
+    pub pops: bool,
     /// Pixels that an outline may be off before background inside of it counts as a gap, 0 or more
     #[arg(long, value_name = "PIXELS", default_value_t = 2.0, value_parser = parse_not_negative, help_heading = "Drawing")]
     pub gap_tolerance: f64,
@@ -106,7 +111,8 @@ pub struct RunArgs {
     /// Tint nodes by level
     #[arg(long, help_heading = "Drawing")]
     pub show_levels: bool,
-    /// `photo`: textures unlit, the rest lit; `head-light`: lit from behind the viewer; `unlit`
+    /// `photo`: textures unlit, the rest lit from above and one side of the scene; `head-light`: lit from
+    /// behind the viewer; `unlit`
     #[arg(long, value_enum, default_value_t = ShadingArg::Photo, help_heading = "Drawing")]
     pub shading: ShadingArg,
     /// Cull back faces of materials that are not double-sided
@@ -218,6 +224,17 @@ fn parse_setting(text: &str) -> std::result::Result<(String, f64), String> {
 pub enum FarFieldArg {
     Off,
     Cells,
+    Auto,
+}
+
+impl From<FarFieldArg> for FarFieldMode {
+    fn from(mode: FarFieldArg) -> Self {
+        match mode {
+            FarFieldArg::Off => Self::Off,
+            FarFieldArg::Cells => Self::Cells,
+            FarFieldArg::Auto => Self::Auto,
+        }
+    }
 }
 
 impl RunArgs {
@@ -236,7 +253,7 @@ impl RunArgs {
             size: self.size,
             warm_up_frames: self.warm_up_frames,
             cull_hidden: self.visibility == Switch::On,
-            far_field: self.far_field == FarFieldArg::Cells,
+            far_field: self.far_field.into(),
             textures: self.textures.format().unwrap_or_default(),
             seed: self.seed,
         })

@@ -4,6 +4,7 @@ mod capture;
 mod depths;
 mod parallax_mesh;
 mod parallax_simplify;
+mod patches;
 mod raster;
 mod uncovered;
 
@@ -13,13 +14,14 @@ use glam::{DQuat, DVec3, Vec3};
 use image::RgbaImage;
 use parallax_mesh::ParallaxMesh;
 use parallax_simplify::simplified;
+use patches::patches;
 
 use super::options::CellOptions;
 use crate::Result;
 use crate::format::cells::FaceView;
 use crate::format::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 use crate::mesh::{AlphaMode, Wrap};
-use crate::texture::face_picture;
+use crate::texture::{FacePicture, face_picture};
 
 /// Neighbours are of one surface where the parallax of one is so near to what the surface of the other goes
 /// on to, pixels.
@@ -59,19 +61,24 @@ impl Captured {
         let depths = self.depths(reach_m, options);
         let whole = ParallaxMesh::new(&depths, APART_PX);
         let found = simplified(&whole, &depths, options.error_px as f32)?;
-        let Some([from, to]) = window(&found.mesh, self.picture.width()) else { return Ok(None) };
         let points = &found.mesh.points;
+        if points.is_empty() {
+            return Ok(None);
+        }
+        let (patches, of_points) = patches(&found.mesh, self.picture.dimensions().into());
+        let FacePicture { bytes, size, shifts } =
+            face_picture(&self.picture, &patches, options.jpeg_quality)?;
         let positions = points.iter().map(|&at| self.position(at, &depths, origin, options));
-        let size = [to[0] - from[0], to[1] - from[1]];
-        let texcoord =
-            |at: &[f32; 3]| [0, 1].map(|axis| (at[axis] - from[axis] as f32) / size[axis] as f32);
-        let bytes = face_picture(&self.picture, from, size, options.jpeg_quality)?;
+        let texcoord = |(at, &patch): (&[f32; 3], &u32)| {
+            let shift = shifts[patch as usize];
+            [0, 1].map(|axis| (at[axis] + shift[axis]) / size[axis] as f32)
+        };
         let forward = self.rotation * DVec3::NEG_Z;
         let to_camera = forward.dot(self.eye - origin);
         Ok(Some(Layer {
             positions: positions.collect(),
             triangles: found.mesh.triangles.clone(),
-            texcoords: points.iter().map(texcoord).collect(),
+            texcoords: points.iter().zip(&of_points).map(texcoord).collect(),
             image: NodeImage {
                 width: size[0],
                 height: size[1],
@@ -169,19 +176,6 @@ impl Made {
         }
         Some(made)
     }
-}
-
-/// Two corners, in pixels, of the part of a picture that a mesh needs: a pixel more on each side, so that
-/// what is filtered at its border is its own. None where there is no mesh.
-fn window(mesh: &ParallaxMesh, side: u32) -> Option<[[u32; 2]; 2]> {
-    let mut points = mesh.points.iter().map(|&[x, y, _]| [x, y]);
-    let first = points.next()?;
-    let [min, max] = points.fold([first; 2], |[min, max], at| {
-        [[min[0].min(at[0]), min[1].min(at[1])], [max[0].max(at[0]), max[1].max(at[1])]]
-    });
-    let from = min.map(|at| (at.floor() as u32).saturating_sub(1));
-    let to = max.map(|at| (at.ceil() as u32 + 1).min(side));
-    Some([from, to])
 }
 
 fn bounds(layers: &[Layer], origin: DVec3) -> Option<[[f64; 3]; 2]> {

@@ -126,7 +126,23 @@ impl HiddenNodes {
         !self.in_sight.get_or(node, is_in_sight)
     }
 
-    /// The same for half a second at least.
+    /// Whether a node is behind what was drawn, as seen by the whole of a view: [`hides`](Self::hides) takes
+    /// what is outside of the [box](crate::camera::Frustum::within) of a frame's view for hidden.
+    pub fn is_behind(&self, tree: &SceneTree, node: u32, view: &View) -> bool {
+        let is_out = |bbox| view.frustum.outside(bbox) > 0.0 || self.picture.hides(view, bbox);
+        self.view.is_some()
+            && match &self.nodes[node as usize] {
+                Some(occlusion) => occlusion.all_out(is_out),
+                None => is_out(tree.node(node).bbox),
+            }
+    }
+
+    /// Whether it was looked for what hides what in this frame.
+    pub fn is_known(&self) -> bool {
+        self.view.is_some()
+    }
+
+    /// Whether a node has been [hidden](Self::hides) for half a second at least.
     pub fn hides_steadily(&self, tree: &SceneTree, node: u32) -> bool {
         self.hides(tree, node) && self.now_s - self.seen_s[node as usize].get() >= STEADY_S
     }

@@ -7,6 +7,7 @@ mod best_first;
 mod descent;
 mod gain_over_price;
 pub mod lakhia;
+mod outlook;
 mod parameter;
 mod ranked;
 mod screen_area;
@@ -17,6 +18,8 @@ mod unused;
 
 use super::Policy;
 use crate::{Error, Result};
+pub(super) use gain_over_price::part_of_picture;
+pub(super) use outlook::{Outlook, wrong};
 pub use parameter::{ParameterInfo, Settings};
 
 /// A policy that can be chosen.

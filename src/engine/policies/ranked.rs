@@ -53,7 +53,12 @@ pub(super) fn wholly_refining_ms(frame: &FrameInput<'_>, node: u32) -> f64 {
     added_ms(frame, node, frame.tree.children(node).iter().copied())
 }
 
-fn added_ms(frame: &FrameInput<'_>, node: u32, children: impl Iterator<Item = u32>) -> f64 {
+/// Milliseconds that some of the children of a node take more than the node; more than 0.
+pub(super) fn added_ms(
+    frame: &FrameInput<'_>,
+    node: u32,
+    children: impl Iterator<Item = u32>,
+) -> f64 {
     let load = |node: u32| geometry_load(frame.tree.node(node));
     let mut sum = Load::default();
     for child in children.map(load) {

@@ -12,11 +12,6 @@ pub const CELLS_FILE: &str = "cells.hlod";
 /// The folder of their faces inside an output folder.
 pub const CELLS_DIR: &str = "cells";
 
-/// The first bytes of every index of cells, whatever its version.
-pub(super) const CELLS_MAGIC: [u8; 8] = *b"HLODCEL\x1a";
-/// The version of the index that this crate writes, and the only one that it reads.
-pub(super) const CELLS_VERSION: u32 = 1;
-
 /// The contents of `cells.hlod`: virtual cells (Aliaga and others, 1999, section 3).
 ///
 /// Cells are cubes of a regular lattice: cell `[i, j, k]` reaches from `size × [i, j, k]` to `size × [i + 1,
@@ -29,6 +24,8 @@ pub struct Cells {
     pub parameters: serde_json::Value,
     /// Metres along the side of a cell.
     pub size: f64,
+    /// Metres that a texel of a face covers at one metre's distance, in the middle of its picture.
+    pub texel: f64,
     /// In the order of their places, none twice.
     pub cells: Vec<Cell>,
     /// The faces of all cells, in the order of their cells.

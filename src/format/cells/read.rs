@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use super::super::bytes::{Cursor, CutShort};
+use super::super::index_file::NotWhole;
 use super::super::{Scene, is_plain_file_name};
-use super::{CELLS_FILE, CELLS_MAGIC, CELLS_VERSION, Cell, Cells, Face, FaceView};
+use super::write::CELLS;
+use super::{CELLS_FILE, Cell, Cells, Face, FaceView};
 use crate::{Error, Result};
 
-/// Bytes of magic, version, a number that is 0, and length.
-const PREFIX: usize = 24;
 /// Bytes of a cell without faces.
 const CELL_SIZE: usize = 76;
 /// Bytes of a face with an empty file name and no views.
@@ -19,32 +19,18 @@ const VIEW_SIZE: usize = 28;
 /// Why bytes are not an index of cells.
 #[derive(Debug, thiserror::Error)]
 enum Unreadable {
-    #[error("not an index of cells: expected it to begin with {CELLS_MAGIC:02x?}, found {0:02x?}")]
-    Magic(Vec<u8>),
-    #[error(
-        "version of cells: expected {CELLS_VERSION}, found {0}; prepare them again with this version"
-    )]
-    Version(u32),
-    #[error("expected {expected} bytes, found {found}: the file is truncated or was appended to")]
-    Length { expected: u64, found: usize },
-    #[error("damaged: expected CRC-32 {expected:08x}, found {found:08x}")]
-    Checksum { expected: u32, found: u32 },
+    #[error(transparent)]
+    NotWhole(#[from] NotWhole),
     #[error("truncated: {0}")]
-    CutShort(CutShort),
+    CutShort(#[from] CutShort),
     #[error("parameters: expected JSON: {0}")]
     Parameters(serde_json::Error),
     #[error("expected the checksum after the last cell, found {0} bytes more")]
     Trailing(usize),
-    #[error("size of cells: expected a length above 0, found {0}")]
-    Size(f64),
+    #[error("{what}: expected a length above 0, found {found}")]
+    Length { what: &'static str, found: f64 },
     #[error("cell {cell}: {what}")]
     Unsound { cell: usize, what: String },
-}
-
-impl From<CutShort> for Unreadable {
-    fn from(cut: CutShort) -> Self {
-        Self::CutShort(cut)
-    }
 }
 
 impl Cells {
@@ -60,7 +46,7 @@ impl Cells {
 
     /// Reads cells from the bytes of their file; `path` is for messages only.
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
-        parse(bytes).map_err(|why| Error::input(path, why.to_string()))
+        contents(bytes).map_err(|why| Error::input(path, why.to_string()))
     }
 
     /// Refuses cells of another build than this scene.
@@ -82,44 +68,14 @@ impl Cells {
     }
 }
 
-fn parse(bytes: &[u8]) -> Result<Cells, Unreadable> {
-    let mut prefix = Cursor::new(bytes);
-    let magic = &bytes[..bytes.len().min(CELLS_MAGIC.len())];
-    if !CELLS_MAGIC.starts_with(magic) || magic.is_empty() {
-        return Err(Unreadable::Magic(magic.to_vec()));
-    }
-    prefix.take(CELLS_MAGIC.len() as u64, "magic")?;
-    let version = prefix.u32("version")?;
-    if version != CELLS_VERSION {
-        return Err(Unreadable::Version(version));
-    }
-    prefix.u32("flags")?;
-    let expected = prefix.u64("file length")?;
-    if expected != bytes.len() as u64 {
-        return Err(Unreadable::Length { expected, found: bytes.len() });
-    }
-    let (body, seal) = match bytes.split_last_chunk::<4>() {
-        Some((body, seal)) if body.len() >= PREFIX => (body, u32::from_le_bytes(*seal)),
-        _ => return Err(Unreadable::Length { expected: PREFIX as u64 + 4, found: bytes.len() }),
-    };
-    let found = crc32fast::hash(body);
-    if found != seal {
-        return Err(Unreadable::Checksum { expected: seal, found });
-    }
-    let mut cursor = Cursor::new(body);
-    cursor.take(PREFIX as u64, "header")?;
-    contents(&mut cursor)
-}
-
-fn contents(cursor: &mut Cursor<'_>) -> Result<Cells, Unreadable> {
+fn contents(bytes: &[u8]) -> Result<Cells, Unreadable> {
+    let (_, mut cursor) = CELLS.open(bytes)?;
+    let cursor = &mut cursor;
     let scene = cursor.array("fingerprint")?;
     let length = cursor.count(1, "parameters")?;
     let parameters = serde_json::from_slice(cursor.take(length as u64, "parameters")?)
         .map_err(Unreadable::Parameters)?;
-    let size = cursor.f64("size of cells")?;
-    if !(size > 0.0 && size.is_finite()) {
-        return Err(Unreadable::Size(size));
-    }
+    let [size, texel] = [a_length(cursor, "size of cells")?, a_length(cursor, "texel of a face")?];
     let count = cursor.count(CELL_SIZE, "number of cells")?;
     let mut cells: Vec<Cell> = Vec::with_capacity(count);
     let mut faces = Vec::new();
@@ -132,8 +88,16 @@ fn contents(cursor: &mut Cursor<'_>) -> Result<Cells, Unreadable> {
         cells.push(cell);
     }
     match cursor.left() {
-        0 => Ok(Cells { scene, parameters, size, cells, faces }),
+        0 => Ok(Cells { scene, parameters, size, texel, cells, faces }),
         left => Err(Unreadable::Trailing(left)),
+    }
+}
+
+fn a_length(cursor: &mut Cursor<'_>, what: &'static str) -> Result<f64, Unreadable> {
+    let found = cursor.f64(what)?;
+    match found > 0.0 && found.is_finite() {
+        true => Ok(found),
+        false => Err(Unreadable::Length { what, found }),
     }
 }
 

@@ -22,6 +22,7 @@ fn cells() -> Cells {
         scene: [3; 32],
         parameters: serde_json::json!({"cell": 4.0}),
         size: 4.0,
+        texel: 0.004,
         cells: vec![cell(-1, 0..1), cell(3, 1..1)],
         faces: vec![face],
     }

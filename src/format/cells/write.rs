@@ -1,35 +1,35 @@
 //! Writes `cells.hlod`.
 //!
-//! All little-endian; a text is its length in bytes as u32 and then UTF-8.
+//! In an [`IndexFile`] without flags. All little-endian; a text is its length in bytes as u32 and then UTF-8.
 //!
 //! ```text
-//! magic [u8; 8] · version u32 · 0 u32 · file length u64
-//! fingerprint of the scene [u8; 32] · parameters text (JSON) · size f64
+//! fingerprint of the scene [u8; 32] · parameters text (JSON) · size, texel f64
 //! count u32 · cells: place [i64; 3] · cull box min and max [f64; 6]
 //!             count u32 · faces: file name text · file bytes u64 · file CRC-32 u32
 //!                         vertices, triangles u32 · bounding box min and max [f64; 6] · error f64
 //!                         count u32 · views: width, height u32 · solid angle f32 · projection [f32; 4]
-//! CRC-32 u32 of all that precedes
 //! ```
 
+use super::super::index_file::IndexFile;
 use super::super::sink::Sink;
-use super::{CELLS_MAGIC, CELLS_VERSION, Cells, Face};
+use super::{Cells, Face};
 use crate::Result;
 
-/// Where the length of the file stands.
-const LENGTH_AT: usize = 16;
+pub(super) const CELLS: IndexFile = IndexFile {
+    magic: *b"HLODCEL\x1a",
+    version: 2,
+    what: "an index of cells",
+    version_of: "version of cells",
+    then: "prepare them again with this version",
+};
 
 impl Cells {
     /// The bytes of `cells.hlod`.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
-        let mut out = Sink(Vec::with_capacity(256 + 1024 * self.cells.len()));
-        out.0.extend(CELLS_MAGIC);
-        out.u32(CELLS_VERSION);
-        out.u32(0);
-        out.u64(0); // the length, once it is known
+        let mut out = CELLS.begin(0, 256 + 1024 * self.cells.len());
         out.0.extend(self.scene);
         out.text(&self.parameters.to_string())?;
-        out.f64s(&[self.size]);
+        out.f64s(&[self.size, self.texel]);
         out.count(self.cells.len())?;
         for cell in &self.cells {
             cell.place.iter().for_each(|&at| out.u64(at as u64));
@@ -37,11 +37,7 @@ impl Cells {
             out.count(cell.faces.len())?;
             self.faces_of(cell).iter().try_for_each(|face| out.face(face))?;
         }
-        let mut bytes = out.0;
-        let length = bytes.len() as u64 + 4;
-        bytes[LENGTH_AT..LENGTH_AT + 8].copy_from_slice(&length.to_le_bytes());
-        bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
-        Ok(bytes)
+        Ok(IndexFile::end(out))
     }
 }
 

@@ -77,9 +77,17 @@ impl Gain {
 }
 
 /// How much less wrong each pixel of a node is by its children.
-fn removed(tree: &SceneTree, node: u32, per_metre: f64) -> f64 {
+pub(in crate::engine) fn removed(tree: &SceneTree, node: u32, per_metre: f64) -> f64 {
     let (at, children) = (tree.node(node), tree.children(node));
     let wrong = |error: f64| (error * per_metre).sqrt();
     let errors = children.iter().map(|&child| wrong(tree.node(child).mean_error));
     (wrong(at.mean_error) - errors.sum::<f64>() / children.len().max(1) as f64).max(0.0)
+}
+
+/// The part of the picture in which a node is seen now, 0 to 1.
+pub(in crate::engine) fn part_of_picture(frame: &FrameInput<'_>, node: u32) -> f64 {
+    let &FrameInput { tree, view, seen, .. } = frame;
+    let area = seen.and_then(|seen| seen.of(tree, node));
+    let per_metre = tree.pixels_per_metre(node, view);
+    (area.unwrap_or_else(|| SeenAreas::usual(tree, node, view)) * per_metre * per_metre).min(1.0)
 }

@@ -58,8 +58,12 @@ pub(super) struct Levels {
     have_changed: bool,
     /// The highest budget of late, milliseconds.
     highest_ms: f64,
-    /// When the budget was much less than that last.
+    /// When the budget was much less than that last, or another part of the scene was to be drawn.
     slow_s: Option<f64>,
+    /// Whether what is far is not to be drawn.
+    is_within: bool,
+    /// When that changed last.
+    within_s: f64,
     pose: Option<Pose>,
     /// When the camera moved last.
     moved_s: f64,
@@ -78,6 +82,11 @@ impl Levels {
         self.highest_ms = (self.highest_ms * kept).max(frame.budget_ms);
         if frame.budget_ms < SLOW * self.highest_ms {
             self.slow_s = Some(self.now_s);
+        }
+        let is_within = frame.view.frustum.box_within().is_some();
+        if std::mem::replace(&mut self.is_within, is_within) != is_within {
+            // What gave way to what is far, or gives way now, is not to blame either.
+            (self.within_s, self.slow_s) = (self.now_s, Some(self.now_s));
         }
         self.dwell_s = options.dwell_s;
     }
@@ -132,11 +141,11 @@ impl Levels {
 
     /// Whether a node of this rank is not to be refined yet, where the least rank of those that are
     /// is `least`. Once a camera that moved stands still, what it takes to draw does not change, and
-    /// nothing need rest.
+    /// nothing need rest; nor once there is more or less to draw beside it.
     pub fn rests(&self, node: u32, rank: f64, least: f64) -> bool {
         let Level { changed_s, rest_s, rank: then, was_still, .. } = self.nodes[node as usize];
         let since_s = self.now_s - changed_s;
-        let may_rest = was_still || !self.is_still();
+        let may_rest = (was_still || !self.is_still()) && changed_s >= self.within_s;
         since_s < self.dwell_s || may_rest && since_s < rest_s && rank < RISEN * then.min(least)
     }
 }

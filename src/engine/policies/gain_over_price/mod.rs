@@ -25,6 +25,7 @@ use crate::Result;
 use crate::engine::{FrameInput, Policy, Selection};
 use ahead::Ahead;
 use gain::Gain;
+pub(in crate::engine) use gain::{part_of_picture, removed};
 use levels::Levels;
 
 /// A frame is full from this part of its budget on.

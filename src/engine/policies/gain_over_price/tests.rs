@@ -57,6 +57,23 @@ fn what_gave_way_to_a_machine_that_became_slower_returns_once_it_is_fast_again()
     assert_eq!(frame.front(&mut *policy), [1, 2, 4, 5]);
 }
 
+#[test]
+fn what_gave_way_to_what_is_far_returns_once_that_is_not_drawn() {
+    let trees = vec![root(10.0, 0.1, 2), root(11.0, 0.1, 2), root(40.0, 0.1, 2)];
+    let mut frame = TestFrame::new(tree(trees));
+    frame.target_ms = 40.0;
+    let mut policy = policy(&[]);
+    let whole = frame.view;
+    let near = whole.within(Some([[-20.0; 3].into(), [20.0; 3].into()]));
+    frame.view = near;
+    assert_eq!((0..30).map(|_| frame.front(&mut *policy)).last().unwrap(), [1, 2, 4, 5]);
+    // Refined only just now: it would rest for long, had it given way for its own price.
+    frame.view = whole;
+    assert_eq!((0..60).map(|_| frame.front(&mut *policy)).last().unwrap(), [1, 2, 3, 6]);
+    frame.view = near;
+    assert_eq!(frame.front(&mut *policy), [1, 2, 4, 5]);
+}
+
 /// Whether the farther of two is refined rather than the nearer, once the camera went so many metres
 /// towards both. From where it begins both rank alike; from further on, the nearer ranks higher.
 fn is_farther(metres: &[f64], settings: &[(&str, f64)]) -> Vec<bool> {

@@ -1,12 +1,39 @@
 //! What is far, drawn from the faces of cells.
 
+mod balance;
+
 use std::sync::Arc;
 
+use balance::Balance;
 use glam::DVec3;
+use serde::Serialize;
 
-use super::{Load, PredictedView, Residents};
+use super::{FrameInput, HiddenNodes, Load, PredictedView, Residents};
 use crate::camera::View;
 use crate::format::cells::{Cell, Cells};
+
+/// What is drawn of what is far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FarFieldMode {
+    /// The hierarchy.
+    #[default]
+    Off,
+    /// The faces of the cell in which the eye is.
+    Cells,
+    /// The same where they are expected to show a view better than the hierarchy, in the time that there is.
+    Auto,
+}
+
+/// What a frame shows of the far field.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FarShown {
+    /// Faces that are drawn, by their numbers.
+    pub faces: Vec<u32>,
+    /// The cull box at which nodes are cut, outside of which faces are drawn; `None` where the hierarchy is
+    /// drawn alone.
+    pub cull_box: Option<[DVec3; 2]>,
+}
 
 /// Draws what is outside of the cull box of the cell in which the eye is as the cell's faces, once those in
 /// view are in memory: a far field in front of any policy (Aliaga and others, 1999).
@@ -16,49 +43,75 @@ use crate::format::cells::{Cell, Cells};
 pub struct FarField {
     cells: Arc<Cells>,
     first: u32,
-    /// The faces that are drawn, and their cull box.
-    drawn: Vec<u32>,
-    cull_box: Option<[DVec3; 2]>,
+    shown: FarShown,
+    /// What the frame before showed.
+    before: FarShown,
+    /// Where faces are drawn only if they pay.
+    balance: Option<Balance>,
 }
 
 impl FarField {
-    /// Over cells, whose faces have numbers from `first` on.
-    pub fn new(cells: Arc<Cells>, first: u32) -> Self {
-        Self { cells, first, drawn: Vec::new(), cull_box: None }
+    /// Over cells, whose faces have numbers from `first` on; none where the mode is off.
+    pub fn new(cells: Arc<Cells>, first: u32, mode: FarFieldMode) -> Option<Self> {
+        let balance = match mode {
+            FarFieldMode::Off => return None,
+            FarFieldMode::Cells => None,
+            FarFieldMode::Auto => Some(Balance::default()),
+        };
+        let (shown, before) = (FarShown::default(), FarShown::default());
+        Some(Self { cells, first, shown, before, balance })
+    }
+
+    /// Whether faces are wanted.
+    fn is_wanted(&self) -> bool {
+        self.balance.as_ref().is_none_or(Balance::uses_faces)
+    }
+
+    /// A frame is chosen, that began `dt_s` seconds after the one before; whether to [weigh](Self::weigh).
+    pub fn is_due(&mut self, dt_s: f64, hidden: Option<&HiddenNodes>) -> bool {
+        self.balance.as_mut().is_some_and(|balance| balance.is_due(dt_s, hidden))
+    }
+
+    /// Weighs whether faces show a view better than the hierarchy from now on. `frame` is of all of the view
+    /// and has the budget for all of it, `front` is what was chosen; nodes covered so much of the picture of
+    /// late, 0 to 1.
+    pub fn weigh(&mut self, frame: &FrameInput<'_>, front: &[u32], covered: f64) {
+        if let Some(mut balance) = self.balance.take() {
+            balance.weigh(self, frame, front, covered);
+            self.balance = Some(balance);
+        }
     }
 
     /// Finds out what is drawn of a view. Where the eye is in no cell, or a face in view is not in memory, it
     /// is nothing, and the hierarchy is drawn alone.
     pub fn look(&mut self, view: &View, residents: &Residents) {
-        self.drawn.clear();
-        self.cull_box = None;
-        let Some(cell) = self.cell_at(view.pose.position) else { return };
+        self.before = std::mem::take(&mut self.shown);
+        let Some(cell) = self.cell_wanted(view) else { return };
         let in_view = self.in_view(cell, view);
         if in_view.iter().all(|&face| residents.contains(face)) {
-            self.cull_box = Some(cull_box(cell));
-            self.drawn = in_view;
+            self.shown = FarShown { faces: in_view, cull_box: Some(cull_box(cell)) };
         }
     }
 
-    /// The box outside of which no node is drawn, if so.
-    pub fn cull_box(&self) -> Option<[DVec3; 2]> {
-        self.cull_box
+    /// What is drawn.
+    pub fn shown(&self) -> &FarShown {
+        &self.shown
     }
 
-    /// Faces that are drawn.
-    pub fn drawn(&self) -> &[u32] {
-        &self.drawn
+    /// What the frame before drew, where that was of another cell, or was the hierarchy alone.
+    pub fn shown_before(&self) -> Option<&FarShown> {
+        (self.before.cull_box != self.shown.cull_box).then_some(&self.before)
     }
 
-    /// Triangles of these.
+    /// Triangles of the faces that are drawn.
     pub fn triangles(&self) -> u64 {
         let face = |&number: &u32| &self.cells.faces[(number - self.first) as usize];
-        self.drawn.iter().map(|number| u64::from(face(number).triangles)).sum()
+        self.shown.faces.iter().map(|number| u64::from(face(number).triangles)).sum()
     }
 
     /// The view of a camera that may be here soon: without what a cell would show of it.
     pub fn expected(&self, at: &PredictedView) -> PredictedView {
-        let within = self.cell_at(at.view.pose.position).map(cull_box);
+        let within = self.cell_wanted(&at.view).map(cull_box);
         PredictedView { view: at.view.within(within), ..*at }
     }
 
@@ -72,12 +125,12 @@ impl FarField {
         out: &mut Vec<(u32, f64)>,
     ) {
         let mut wanted: Vec<(u32, f64)> = Vec::new();
-        if let Some(cell) = self.cell_at(view.pose.position) {
+        if let Some(cell) = self.cell_wanted(view) {
             wanted.extend(self.in_view(cell, view).into_iter().map(|face| (face, 4.0)));
             wanted.extend(self.faces_of(cell).map(|face| (face, 2.0)));
         }
         for at in predicted {
-            let Some(cell) = self.cell_at(at.view.pose.position) else { continue };
+            let Some(cell) = self.cell_wanted(&at.view) else { continue };
             let useful = 1.0 + 1.0 / (1.0 + at.after_s);
             wanted.extend(self.in_view(cell, &at.view).into_iter().map(|face| (face, useful)));
         }
@@ -90,10 +143,14 @@ impl FarField {
     /// What the faces that are drawn ask of a machine, where nodes cover so much of the picture before them,
     /// 0 to 1.
     pub fn load(&self, view: &View, covered: f64) -> Load {
+        self.load_of(&self.shown.faces, view, covered)
+    }
+
+    fn load_of(&self, faces: &[u32], view: &View, covered: f64) -> Load {
         let mut load = Load::default();
         let steradians_px = view.pixels_per_metre().powi(2);
         let [width, height] = view.size.map(f64::from);
-        for &number in &self.drawn {
+        for &number in faces {
             let face = &self.cells.faces[(number - self.first) as usize];
             load.draws += face.views.len() as f64;
             load.vertices += f64::from(face.vertices);
@@ -109,6 +166,16 @@ impl FarField {
 
     fn cell_at(&self, point: DVec3) -> Option<&Cell> {
         self.cells.cell_at(point.to_array())
+    }
+
+    /// The cell from which a view is drawn.
+    fn cell_wanted(&self, view: &View) -> Option<&Cell> {
+        self.cell_at(view.pose.position).filter(|_| self.is_wanted())
+    }
+
+    /// Metres that a texel of a face covers at one metre's distance.
+    fn texel(&self) -> f64 {
+        self.cells.texel
     }
 
     /// The numbers of the faces of a cell.
@@ -167,10 +234,11 @@ mod tests {
             scene: [0; 32],
             parameters: serde_json::Value::Null,
             size: 10.0,
+            texel: 0.01,
             cells: vec![cell(0, 0), cell(1, 2)],
             faces: vec![ahead.clone(), behind.clone(), ahead, behind],
         };
-        FarField::new(Arc::new(cells), FIRST)
+        FarField::new(Arc::new(cells), FIRST, FarFieldMode::Cells).unwrap()
     }
 
     fn at(x: f64) -> View {
@@ -185,7 +253,7 @@ mod tests {
         let mut residents = Residents::none(14);
         let mut look = |x: f64, residents: &Residents| {
             far_field.look(&at(x), residents);
-            (far_field.drawn().to_vec(), far_field.cull_box().map(|[min, _]| min.x))
+            (far_field.shown().faces.clone(), far_field.shown().cull_box.map(|[min, _]| min.x))
         };
         assert_eq!(look(5.0, &residents), (vec![], None), "not there");
         residents.set(11, true);

@@ -1,0 +1,281 @@
+//! Whether faces show a view better than the hierarchy.
+
+use glam::DVec3;
+
+use super::FarField;
+use crate::engine::policies::{Outlook, part_of_picture, wrong};
+use crate::engine::{FrameInput, HiddenNodes, Visibility};
+
+/// It is weighed so often, seconds.
+const EVERY_S: f64 = 0.25;
+
+/// What hides what is not looked for in every frame; it is weighed without after so many seconds.
+const LATEST_S: f64 = 0.75;
+
+/// One way is left where the other is better by this part.
+const BETTER: f64 = 0.1;
+
+/// Frames that take longer than their budget by more than this part are late.
+const LATE: f64 = 0.1;
+
+/// How much more of FLIP a wrong pixel beyond a cull box is than one before it, over walks and drives in
+/// two cities: what is far is small, and full of edges.
+const FAR_WEIGHT: f64 = 4.0;
+
+/// A face is wrong by so many of its texels: it is as far off as one at most, and blurred.
+const FACE_TEXELS: f64 = 1.0;
+
+/// Of the budget, so much is counted on where a way is not in use: more than expected may be seen at first.
+const COUNTED_ON: f64 = 0.85;
+
+/// A way is given so many seconds before it is weighed: levels come and go meanwhile.
+const SETTLES_S: f64 = 1.0;
+
+/// By how much a way to draw fell short of what was expected of it is half forgotten after so many seconds.
+const HALF_LIFE_S: f64 = 8.0;
+
+/// Weighs, now and then, whether faces show a view better than the hierarchy, by what the image gains in
+/// the time that they leave over.
+///
+/// Of the way that is in use it is known how wrong it is; of the other it is expected, and more so by as
+/// much as it fell short of that when it was in use last: levels may have had no time to arrive, or hide
+/// less than finer ones would.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Balance {
+    use_faces: bool,
+    since_s: f64,
+    /// Of the hierarchy alone, and with faces.
+    fell_short: [Picture; 2],
+    /// What the way in use was expected to be, where it has not been weighed since.
+    promised: Option<Picture>,
+    alone: Visibility,
+    beside: Visibility,
+    in_sight: Visibility,
+}
+
+/// What a way to draw a view comes to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Picture {
+    /// Milliseconds over the budget.
+    over_ms: f64,
+    /// How wrong it is.
+    wrong: f64,
+}
+
+impl Picture {
+    fn more(self, than: Self) -> Self {
+        Self {
+            over_ms: (self.over_ms - than.over_ms).max(0.0),
+            wrong: (self.wrong - than.wrong).max(0.0),
+        }
+    }
+
+    fn or_more(self, other: Self) -> Self {
+        Self { over_ms: self.over_ms.max(other.over_ms), wrong: self.wrong.max(other.wrong) }
+    }
+
+    fn and(self, more: Self, times: f64) -> Self {
+        Self {
+            over_ms: self.over_ms + times * more.over_ms,
+            wrong: self.wrong + times * more.wrong,
+        }
+    }
+}
+
+impl Balance {
+    /// Whether faces are to be drawn.
+    pub fn uses_faces(&self) -> bool {
+        self.use_faces
+    }
+
+    /// A frame has begun, `dt_s` seconds after the one before; whether to weigh in it.
+    pub fn is_due(&mut self, dt_s: f64, hidden: Option<&HiddenNodes>) -> bool {
+        self.since_s += dt_s;
+        let is_known = hidden.is_none_or(HiddenNodes::is_known);
+        self.since_s >= if is_known { EVERY_S } else { LATEST_S }
+    }
+
+    /// Weighs both ways to draw a view, by the budget of a frame that draws all of it. `front` is what was
+    /// chosen of it now; nodes covered so much of the picture of late.
+    pub fn weigh(
+        &mut self,
+        far_field: &FarField,
+        frame: &FrameInput<'_>,
+        front: &[u32],
+        covered: f64,
+    ) {
+        let since_s = std::mem::take(&mut self.since_s);
+        let Some(cell) = far_field.cell_at(frame.view.pose.position) else { return };
+        // Until faces are there, what is chosen says nothing of them.
+        if self.use_faces != far_field.shown.cull_box.is_some() {
+            return;
+        }
+        for visibility in [&mut self.alone, &mut self.beside, &mut self.in_sight] {
+            visibility.begin_frame(frame.tree.len());
+        }
+        let is_hidden = |node: u32| {
+            let hides = |hidden: &HiddenNodes| hidden.is_behind(frame.tree, node, frame.view);
+            !self.in_sight.get_or(node, || !frame.hidden.is_some_and(hides))
+        };
+        // What is counted on of the hierarchy alone, and with faces.
+        let mut counted_on = [COUNTED_ON; 2];
+        counted_on[usize::from(self.use_faces)] = 1.0;
+        let alone = FrameInput { visibility: &self.alone, hidden: None, ..*frame };
+        let faces = far_field.in_view(cell, frame.view);
+        let faces_ms = frame.costs.added_ms(&far_field.load_of(&faces, frame.view, covered));
+        let view = frame.view.within(Some(cell.cull_box.map(DVec3::from_array)));
+        let (visibility, budget_ms) = (&self.beside, (frame.budget_ms - faces_ms).max(0.0));
+        let beside = FrameInput { view: &view, visibility, budget_ms, ..alone };
+        let outlook = |frame: &FrameInput<'_>, counted_on: f64| {
+            let budget_ms = frame.budget_ms * counted_on;
+            Outlook::of(&FrameInput { budget_ms, ..*frame }, &is_hidden)
+        };
+        let [whole, near] = [outlook(&alone, counted_on[0]), outlook(&beside, counted_on[1])];
+        let now = front.iter().copied().filter(|&node| !is_hidden(node)).collect();
+
+        let is_far = |&node: &u32| !beside.is_visible(node);
+        let far_of = |front: &[u32]| {
+            Outlook::from_front(front.iter().copied().filter(is_far).collect(), &alone)
+        };
+        let part: f64 =
+            far_of(&whole.front).front.iter().map(|&node| part_of_picture(&alone, node)).sum();
+        let texel_px = FACE_TEXELS * far_field.texel() * frame.view.pixels_per_metre();
+        let faces_wrong = FAR_WEIGHT * part * wrong(texel_px);
+        let without = |of: &Outlook| Picture {
+            over_ms: over_ms(of, &alone),
+            wrong: of.wrong(&alone) + (FAR_WEIGHT - 1.0) * far_of(&of.front).wrong(&alone),
+        };
+        let with = |of: &Outlook| Picture {
+            over_ms: over_ms(of, &beside),
+            wrong: of.wrong(&beside) + faces_wrong,
+        };
+        let expected = [without(&whole), with(&near)];
+        let found = match self.use_faces {
+            false => without(&Outlook::from_front(now, &alone)),
+            true => with(&Outlook::from_front(now, &beside)),
+        };
+        let (now, other) = (usize::from(self.use_faces), usize::from(!self.use_faces));
+        let kept = libm::exp2(-since_s.max(0.0) / HALF_LIFE_S);
+        self.fell_short = self.fell_short.map(|short| Picture::default().and(short, kept));
+        let promised = self.promised.take().unwrap_or(expected[now]);
+        self.fell_short[now] = self.fell_short[now].or_more(found.more(promised));
+        let other = expected[other].and(self.fell_short[other], 1.0);
+        if is_better(other, found) {
+            self.use_faces = !self.use_faces;
+            (self.promised, self.since_s) = (Some(other), EVERY_S - SETTLES_S);
+        }
+    }
+}
+
+/// Milliseconds by which a frame is late.
+fn over_ms(of: &Outlook, frame: &FrameInput<'_>) -> f64 {
+    (of.ms - (1.0 + LATE) * frame.budget_ms).max(0.0)
+}
+
+/// Whether a picture is clearly less late than another, or as late and clearly less wrong.
+fn is_better(picture: Picture, than: Picture) -> bool {
+    let clearly = |less: f64, more: f64| less < (1.0 - BETTER) * more;
+    match (clearly(picture.over_ms, than.over_ms), clearly(than.over_ms, picture.over_ms)) {
+        (true, _) => true,
+        (_, true) => false,
+        _ => clearly(picture.wrong, than.wrong),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::engine::FarFieldMode;
+    use crate::engine::test_frame::{TestFrame, root};
+    use crate::format::cells::{Cell, Cells};
+    use crate::runtime::test_tree::tree;
+
+    fn picture(over_ms: f64, wrong: f64) -> Picture {
+        Picture { over_ms, wrong }
+    }
+
+    #[test]
+    fn what_is_late_less_is_better_and_then_what_is_less_wrong() {
+        let better = |a: [f64; 2], b: [f64; 2]| {
+            [
+                is_better(picture(a[0], a[1]), picture(b[0], b[1])),
+                is_better(picture(b[0], b[1]), picture(a[0], a[1])),
+            ]
+        };
+        assert_eq!(better([1.0, 0.5], [2.0, 0.1]), [true, false]);
+        assert_eq!(better([0.0, 0.5], [1.0, 0.1]), [true, false]);
+        assert_eq!(better([0.0, 0.4], [0.0, 0.5]), [true, false]);
+        // Neither clearly.
+        assert_eq!(better([1.0, 0.5], [0.95, 0.5]), [false; 2]);
+        assert_eq!(better([0.0, 0.5], [0.0, 0.46]), [false; 2]);
+        assert_eq!(better([0.0, 0.0], [0.0, 0.0]), [false; 2]);
+    }
+
+    /// A cell about the eye without faces: what is beyond 20 m costs nothing with it.
+    fn cells() -> Arc<Cells> {
+        let cell = Cell { place: [0, 0, 0], cull_box: [[-20.0; 3], [20.0; 3]], faces: 0..0 };
+        Arc::new(Cells {
+            scene: [0; 32],
+            parameters: serde_json::Value::Null,
+            size: 10.0,
+            texel: 0.01,
+            cells: vec![cell],
+            faces: Vec::new(),
+        })
+    }
+
+    /// A node 10 m away and one 40 m away, of which each takes 10 ms, and 10 more where it is refined.
+    fn frame(target_ms: f64) -> TestFrame {
+        let tree = tree(vec![root(10.0, 0.1, 2), root(40.0, 0.1, 2)]);
+        TestFrame { target_ms, ..TestFrame::new(tree) }
+    }
+
+    fn far_field() -> FarField {
+        FarField::new(cells(), 6, FarFieldMode::Auto).unwrap()
+    }
+
+    /// Whether faces are wanted beside a front, where there is so much time.
+    fn wants_faces(target_ms: f64, front: &[u32]) -> bool {
+        let (frame, mut far_field) = (frame(target_ms), far_field());
+        assert!(!far_field.is_due(0.2, None) && far_field.is_due(0.1, None));
+        far_field.weigh(&frame.input(), front, 0.0);
+        assert!(!far_field.is_due(0.2, None), "it has been weighed");
+        far_field.is_wanted()
+    }
+
+    const ROOTS: [u32; 2] = [0, 3];
+    const LEAVES: [u32; 4] = [1, 2, 4, 5];
+
+    #[test]
+    fn faces_are_used_where_there_is_no_time_for_what_they_show() {
+        // With faces the near leaves take 20 ms.
+        assert!(wants_faces(12.0, &ROOTS), "roots are late");
+        assert!(wants_faces(21.0, &ROOTS), "no time but for roots");
+        assert!(!wants_faces(40.0, &LEAVES), "time for all leaves");
+    }
+
+    #[test]
+    fn what_is_drawn_counts_and_not_what_might_be() {
+        assert!(wants_faces(40.0, &ROOTS));
+    }
+
+    #[test]
+    fn what_fell_short_is_not_expected_again_so_soon() {
+        let frame = frame(40.0);
+        let mut far_field = far_field();
+        let mut balance = Balance::default();
+        let mut weigh = |far_field: &FarField, front: &[u32], since_s: f64| {
+            balance.is_due(since_s, None);
+            balance.weigh(far_field, &frame.input(), front, 0.0);
+            balance.uses_faces()
+        };
+        // The hierarchy alone draws roots where leaves would do.
+        assert!(weigh(&far_field, &ROOTS, 0.5));
+        far_field.shown.cull_box = Some([DVec3::splat(-20.0), DVec3::splat(20.0)]);
+        assert!(weigh(&far_field, &[1, 2], 0.5), "it would again");
+        assert!(weigh(&far_field, &[1, 2], 0.5));
+        assert!(!weigh(&far_field, &[1, 2], 100.0), "that is long ago");
+    }
+}
