@@ -6,13 +6,15 @@
 //! show: [`FarField`](crate::engine::FarField).
 
 #[cfg(feature = "render")]
+mod cull_box;
+#[cfg(feature = "render")]
 mod face;
 mod options;
 mod places;
 #[cfg(feature = "render")]
 mod prepare;
 
-pub use options::CellOptions;
+pub use options::{Balance, CellOptions};
 pub use places::{along, around};
 #[cfg(feature = "render")]
 pub use prepare::{Prepared, Progress, prepare};

@@ -7,6 +7,7 @@ use std::path::Path;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::cull_box::cull_m;
 use super::face::{Capture, DIRECTIONS, Layer, Made};
 use super::options::CellOptions;
 use crate::bench::Session;
@@ -39,6 +40,8 @@ pub struct Prepared {
     pub triangles: u64,
     /// Bytes of all faces.
     pub bytes: u64,
+    /// The least and the most metres from a cell to the sides of its cull box.
+    pub cull_m: [f64; 2],
 }
 
 /// Makes those cells of a built scene that are not there yet, and writes them into its folder. Cells that
@@ -83,7 +86,16 @@ pub fn prepare(
         faces: cells.faces.len(),
         triangles: cells.faces.iter().map(|face| u64::from(face.triangles)).sum(),
         bytes: cells.faces.iter().map(|face| face.file_bytes).sum(),
+        cull_m: cull_m_of(&cells),
     })
+}
+
+/// The least and the most metres from a cell to the sides of its cull box.
+fn cull_m_of(cells: &Cells) -> [f64; 2] {
+    let metres = |cell: &Cell| cells.bounds(cell.place)[0][0] - cell.cull_box[0][0];
+    let mut all: Vec<f64> = cells.cells.iter().map(metres).collect();
+    all.sort_by(f64::total_cmp);
+    [all.first(), all.last()].map(|metres| metres.copied().unwrap_or(0.0))
 }
 
 /// The cells of an earlier run that can stay: made of the same build with the same options, and whole.
@@ -136,8 +148,9 @@ fn cell(
     let min = DVec3::from_array(place.map(|at| at as f64)) * options.cell_m;
     let max = min + DVec3::splat(options.cell_m);
     let around = |metres: f64| [min - DVec3::splat(metres), max + DVec3::splat(metres)];
-    let cull_box = around(options.cull_m);
-    let shown = around(options.cull_m - options.overlap_m());
+    let cull_m = cull_m(session.tree(), session.scene().up, (min + max) / 2.0, options);
+    let cull_box = around(cull_m);
+    let shown = around(cull_m - options.overlap_m(cull_m));
     // Vertices are relative to it, and it stands in a file of f32.
     let eye = ((min + max) / 2.0).as_vec3().as_dvec3();
     let mut layers: [Vec<Layer>; DIRECTIONS.len()] = Default::default();

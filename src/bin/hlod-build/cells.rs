@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use hlod::cells::CellOptions;
+use hlod::cells::{Balance, CellOptions};
 use hlod::{Error, Result};
 
 #[derive(Args, Debug)]
@@ -23,9 +23,18 @@ pub struct CellsArgs {
     /// Side of a cell, metres, above 0. Larger: fewer cells, and more that is seen from elsewhere in them
     #[arg(long, value_name = "METRES", default_value_t = CellOptions::default().cell_m)]
     cell: f64,
-    /// Metres from a cell to the sides of its cull box, above 0: what is farther is drawn from its faces
-    #[arg(long, value_name = "METRES", default_value_t = CellOptions::default().cull_m)]
-    cull: f64,
+    /// Choose the cull box of each cell, 30 to 480 metres from it, so that what is near in a view comes to so many
+    /// triangles, 1 or more, and the sum of its error in pixels and that of what is far is least. About as many
+    /// as there is time for in a frame
+    #[arg(long, value_name = "N", default_value_t = Balance::default().triangles)]
+    triangles: u64,
+    /// What a pixel of error of what is far counts, over one of what is near; above 0
+    #[arg(long, value_name = "WEIGHT", default_value_t = Balance::default().far_weight)]
+    far_weight: f64,
+    /// The same cull box for all cells in place of these: metres from a cell to its sides, above 0. What is farther
+    /// is drawn from its faces
+    #[arg(long, value_name = "METRES", conflicts_with_all = ["triangles", "far_weight"])]
+    cull: Option<f64>,
     /// Pixels along the side of a face, 16-8192
     #[arg(long, value_name = "N", default_value_t = CellOptions::default().pixels)]
     pixels: u32,
@@ -67,9 +76,12 @@ pub fn cells(arguments: &CellsArgs) -> Result<()> {
     }
     let faces = prepared.faces.max(1) as u64;
     print(&format!(
-        "{} cells, {} of them from earlier; {} faces: {} triangles and {} bytes each on average\n",
+        "{} cells, {} of them from earlier; cull boxes of {:.0} to {:.0} m; {} faces: {} triangles and {} \
+         bytes each on average\n",
         prepared.cells,
         prepared.known,
+        prepared.cull_m[0],
+        prepared.cull_m[1],
         prepared.faces,
         prepared.triangles / faces,
         prepared.bytes / faces,
@@ -117,7 +129,11 @@ impl CellsArgs {
     fn options(&self) -> CellOptions {
         CellOptions {
             cell_m: self.grid.unwrap_or(self.cell),
-            cull_m: self.cull,
+            cull_m: self.cull.unwrap_or(CellOptions::default().cull_m),
+            balance: match self.cull {
+                Some(_) => None,
+                None => Some(Balance { triangles: self.triangles, far_weight: self.far_weight }),
+            },
             pixels: self.pixels,
             error_px: self.error,
             jpeg_quality: self.jpeg_quality,

@@ -252,7 +252,7 @@ mod tests {
     fn faces_are_used_where_there_is_no_time_for_what_they_show() {
         // With faces the near leaves take 20 ms.
         assert!(wants_faces(12.0, &ROOTS), "roots are late");
-        assert!(wants_faces(21.0, &ROOTS), "no time but for roots");
+        assert!(wants_faces(25.0, &ROOTS), "no time but for roots");
         assert!(!wants_faces(40.0, &LEAVES), "time for all leaves");
     }
 
