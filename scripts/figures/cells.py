@@ -20,8 +20,8 @@ FRAMES, SETTLE, EVERY = 300, 100, 15
 # Triangles of what is near in a view, by which cull boxes are chosen: the default.
 NEAR = [50_000]
 WAYS = ["off", "cells", "auto"]
-# Streets of which pictures are shown, by the first frame of a walk at the last target.
-PICTURES = [("city", "walk"), ("hamada", "walk")]
+# Streets of which pictures are shown: the first frame of a walk, at a target in milliseconds.
+PICTURES = {"city": 30, "hamada": 10}
 # Pictures in a report.
 JPEG = r"data:image/jpeg;base64,([A-Za-z0-9+/=]+)"
 # What a machine adds by chance: by the model clock, with lavapipe's prices.
@@ -30,6 +30,8 @@ CLOCK = ["--clock", "model", "--seed", "1"]
 
 def main():
     arguments = Options("cells", __doc__, quick="a few frames of one scene", real=True).parse()
+    # Before any picture is written again.
+    made_on = machine()
     programs = Programs(examples=["tile_pictures"], features=True)
     frames = 60 if arguments.quick else FRAMES
     kinds = KINDS[:1] if arguments.quick else KINDS
@@ -51,9 +53,9 @@ def main():
                 ways["auto"] = replay(programs, out, paths[at[0]], at[1], "auto")
                 of_run = f"{what}: {at[0]}, {at[1]} ms"
                 drawn.append([of_run, *compared({"off": alone[at], **ways})])
-        if (name, "walk") in PICTURES and arguments.write:
+        if name in PICTURES and arguments.write:
             pictures.append(street(programs, out, name, paths["walk"]))
-    text = "\n\n".join([machine(), tables(made, drawn, frames), *pictures]) + "\n"
+    text = "\n\n".join([made_on, tables(made, drawn, frames), *pictures]) + "\n"
     print(text)
     if arguments.write:
         write_between_markers(DOCS / "cells.md", "cells", text)
@@ -156,7 +158,7 @@ def compared(ways):
 
 def street(programs, out, name, path):
     """The first frame of a walk by the hierarchy alone, with cells, and of the leaves, as one picture."""
-    target = TARGETS_MS[-1]
+    target = PICTURES[name]
     shown = []
     for way in ["off", "cells"]:
         # No other frame is looked at.
