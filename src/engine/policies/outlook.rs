@@ -6,8 +6,9 @@ use super::gain_over_price::{part_of_picture, removed};
 use super::ranked::{Ranked, added_ms};
 use crate::engine::{FrameInput, FrontLoad};
 
-/// Half of a pixel's worst is what an error of so many pixels makes of it. By `scripts/gain`, that tells of
-/// FLIP over all errors as well as their square root does of small ones.
+/// Half of a pixel's worst is what an error of so many pixels makes of it. For the order in which nodes are
+/// refined the square root is better (`scripts/gain`), but it has no end: one node around the eye, off by a
+/// thousand pixels, would outweigh all else that is wrong with a picture.
 const HALF_WRONG_PX: f64 = 2.0;
 
 /// So often at most a front is summed up: what it takes is not the sum of what its nodes take.
