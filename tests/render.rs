@@ -377,13 +377,14 @@ fn a_light_at_the_viewer_shows_how_planes_stand() {
     // Which way a triangle is turned does not matter.
     floor.indices.reverse();
     assert_eq!(shot(&lit, &mesh(vec![floor])).unwrap(), image);
-    // Pictures hold their own light, unless it is asked for.
+    // Pictures hold their own light, unless it is asked for. What has none is lit from
+    // (0.35, 0.5, 0.79): 0.79 of its length is across this wall.
     let photo = RenderOptions { shading: Shading::Photo, ..options() };
     let surface = Surface { image: Some(0), ..plain([1.0; 3]) };
     let mut textured = mesh(vec![rectangle([-3.0, 3.0], [-3.0, 3.0], 2.0, surface)]);
     textured.images = vec![png(&RgbaImage::from_pixel(4, 4, Rgba([255; 4])))];
     assert_near(at(&shot(&photo, &textured).unwrap(), 0.0, 0.0), [255; 3], 0);
-    assert_near(at(&shot(&photo, &facing).unwrap(), 0.0, 0.0), [encoded(0.9438); 3], 1);
+    assert_near(at(&shot(&photo, &facing).unwrap(), 0.0, 0.0), [encoded(0.7914); 3], 1);
     assert_near(at(&shot(&lit, &textured).unwrap(), 0.0, 0.0), [encoded(0.9438); 3], 1);
 }
 
