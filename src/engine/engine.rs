@@ -221,7 +221,10 @@ impl<'a> Engine<'a> {
         let front = &self.selection.front;
         self.drawn.clear();
         match &mut self.seen.hidden {
-            Some(hidden) => self.drawn.extend(hidden.drawn(self.seen.tree, front, view)),
+            Some(hidden) => {
+                hidden.count_on(&self.selection.counted_on);
+                self.drawn.extend(hidden.drawn(self.seen.tree, front, view));
+            }
             None => self.drawn.extend(front),
         }
         report.select_ms = self.backend.now_ms() - before;

@@ -141,6 +141,9 @@ pub struct Selection {
     pub culled: u32,
     /// Nodes that would be drawn, in place of coarser ones, were they in memory.
     pub lacking: u32,
+    /// Nodes of the front that it hides itself, and that are to be
+    /// [counted on](FrameInput::is_hidden) as such at once.
+    pub counted_on: Vec<u32>,
     /// None of the nodes visited is evicted, not only those of the front.
     pub keep_visited: bool,
 }
@@ -162,6 +165,7 @@ impl Selection {
         self.ahead.clear();
         self.released.clear();
         self.diagnostics.clear();
+        self.counted_on.clear();
         (self.estimate, self.culled, self.lacking, self.keep_visited) = (None, 0, 0, false);
     }
 

@@ -51,6 +51,8 @@ pub struct HiddenNodes {
     is_in_front: Vec<bool>,
     /// Nodes of the frame before that were drawn.
     drawn: Vec<u32>,
+    /// Whether the front to come hides other nodes than that of the frame before.
+    is_another: bool,
     /// Whether it is looked for in this frame.
     is_looked_for: bool,
     since_s: f64,
@@ -72,6 +74,7 @@ impl HiddenNodes {
             now_s: 0.0,
             is_in_front: vec![false; nodes],
             drawn: Vec::new(),
+            is_another: false,
             is_looked_for: true,
             since_s: 0.0,
             saved: 0.0,
@@ -111,11 +114,7 @@ impl HiddenNodes {
     /// Whether nothing of a node would be seen, or of nodes below it that are within its box.
     pub fn hides(&self, tree: &SceneTree, node: u32) -> bool {
         let Some(view) = &self.view else { return false };
-        let is_out = |bbox| view.frustum.outside(bbox) > 0.0 || self.picture.hides(view, bbox);
-        let is_hidden = || match &self.nodes[node as usize] {
-            Some(occlusion) => occlusion.all_out(is_out),
-            None => is_out(tree.node(node).bbox),
-        };
+        let is_hidden = || self.is_out(tree, node, view, &self.picture);
         let is_in_sight = || {
             let is_in_sight = !is_hidden();
             if is_in_sight {
@@ -129,12 +128,33 @@ impl HiddenNodes {
     /// Whether a node is behind what was drawn, as seen by the whole of a view: [`hides`](Self::hides) takes
     /// what is outside of the [box](crate::camera::Frustum::within) of a frame's view for hidden.
     pub fn is_behind(&self, tree: &SceneTree, node: u32, view: &View) -> bool {
-        let is_out = |bbox| view.frustum.outside(bbox) > 0.0 || self.picture.hides(view, bbox);
-        self.view.is_some()
-            && match &self.nodes[node as usize] {
-                Some(occlusion) => occlusion.all_out(is_out),
-                None => is_out(tree.node(node).bbox),
-            }
+        self.view.is_some() && self.is_out(tree, node, view, &self.picture)
+    }
+
+    /// What a front would hide, were it drawn, as far as those in memory are known to hide others.
+    pub fn behind<'a>(&'a self, tree: &'a SceneTree, front: &[u32], view: &'a View) -> Behind<'a> {
+        let hiding: Vec<&NodeOcclusion> =
+            front.iter().filter_map(|&node| self.nodes[node as usize].as_deref()).collect();
+        let mut picture = HidingPicture::default();
+        picture.draw(view, self.near, &hiding, MORE_SLABS);
+        Behind { of: self, tree, view, picture }
+    }
+
+    /// Takes nodes of the front to come, which hides them, for hidden for a while already.
+    pub fn count_on(&mut self, nodes: &[u32]) {
+        for &node in nodes {
+            self.seen_s[node as usize].set(f64::NEG_INFINITY);
+        }
+        self.is_another |= !nodes.is_empty();
+        self.is_looked_for |= self.is_another;
+    }
+
+    fn is_out(&self, tree: &SceneTree, node: u32, view: &View, picture: &HidingPicture) -> bool {
+        let is_out = |bbox| view.frustum.outside(bbox) > 0.0 || picture.hides(view, bbox);
+        match &self.nodes[node as usize] {
+            Some(occlusion) => occlusion.all_out(is_out),
+            None => is_out(tree.node(node).bbox),
+        }
     }
 
     /// Whether it was looked for what hides what in this frame.
@@ -152,7 +172,7 @@ impl HiddenNodes {
         front.iter().for_each(|&node| self.is_in_front[node as usize] = true);
         let all_there = self.hiding.iter().all(|&node| self.is_in_front[node as usize]);
         front.iter().for_each(|&node| self.is_in_front[node as usize] = false);
-        if !all_there {
+        if !all_there || std::mem::take(&mut self.is_another) {
             self.look(view, front);
         }
         self.drawn.clear();
@@ -172,31 +192,36 @@ impl HiddenNodes {
     }
 }
 
+/// What a front would hide that is not drawn yet.
+#[derive(Clone, Debug)]
+pub struct Behind<'a> {
+    of: &'a HiddenNodes,
+    tree: &'a SceneTree,
+    view: &'a View,
+    picture: HidingPicture,
+}
+
+impl Behind<'_> {
+    /// Whether nothing of a node would be seen.
+    pub fn hides(&self, node: u32) -> bool {
+        self.of.is_out(self.tree, node, self.view, &self.picture)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::occlusion::test_mesh::mesh;
-    use crate::mesh::UpAxis;
+    use crate::engine::occlusion::test_wall;
     use crate::runtime::test_tree::{sketch, tree, view};
 
     const FRAME_S: f64 = 1.0 / 32.0;
-
-    /// A square across the view at so many metres.
-    fn wall(distance: f32) -> Option<Arc<NodeOcclusion>> {
-        let corner = |y: f32, z: f32| [distance, y, z];
-        let mesh = mesh(&[
-            [corner(-3.0, -3.0), corner(3.0, -3.0), corner(3.0, 3.0)],
-            [corner(-3.0, -3.0), corner(3.0, 3.0), corner(-3.0, 3.0)],
-        ]);
-        Some(Arc::new(NodeOcclusion::new(&mesh, UpAxis::Z)))
-    }
 
     /// Node 0 at 11 m, and behind it node 1 at 21 m and, not in memory, node 2 at 31 m.
     fn row() -> (SceneTree, HiddenNodes) {
         let tree = tree([11.0, 21.0, 31.0].map(|x| sketch([x, 0.0, 0.0], 1.0, vec![])).into());
         let mut hidden = HiddenNodes::new(3, 0.1);
-        hidden.set(0, wall(10.5));
-        hidden.set(1, wall(20.5));
+        hidden.set(0, Some(test_wall(10.5)));
+        hidden.set(1, Some(test_wall(20.5)));
         (tree, hidden)
     }
 

@@ -23,3 +23,5 @@ pub use hidden_nodes::HiddenNodes;
 pub use node_occlusion::NodeOcclusion;
 pub use occluders::Occluders;
 pub use seen_areas::SeenAreas;
+#[cfg(test)]
+pub(in crate::engine) use test_mesh::test_wall;

@@ -2,8 +2,11 @@
 
 use glam::{DVec3, Vec3};
 
+use std::sync::Arc;
+
+use super::NodeOcclusion;
 use crate::format::{NodeMesh, Primitive, Surface};
-use crate::mesh::{AlphaMode, Wrap};
+use crate::mesh::{AlphaMode, UpAxis, Wrap};
 use crate::random::Random;
 
 /// Opaque triangles without textures, drawn from either side.
@@ -27,6 +30,16 @@ pub(super) fn mesh(triangles: &[[[f32; 3]; 3]]) -> NodeMesh {
             },
         }],
     }
+}
+
+/// A square of 6 m across x, so many metres away.
+pub(in crate::engine) fn test_wall(distance: f32) -> Arc<NodeOcclusion> {
+    let corner = |y: f32, z: f32| [distance, y, z];
+    let mesh = mesh(&[
+        [corner(-3.0, -3.0), corner(3.0, -3.0), corner(3.0, 3.0)],
+        [corner(-3.0, -3.0), corner(3.0, 3.0), corner(-3.0, 3.0)],
+    ]);
+    Arc::new(NodeOcclusion::new(&mesh, UpAxis::Z))
 }
 
 /// A wall of 12 by 8 m at x = 0 with bumps, of which some triangles are missing, and some others stand

@@ -10,6 +10,7 @@
 
 mod ahead;
 mod gain;
+mod leap;
 mod levels;
 #[cfg(test)]
 mod tests;
@@ -26,6 +27,7 @@ use crate::engine::{FrameInput, Policy, Selection};
 use ahead::Ahead;
 use gain::Gain;
 pub(in crate::engine) use gain::{part_of_picture, removed};
+use leap::Leap;
 use levels::Levels;
 
 /// A frame is full from this part of its budget on.
@@ -92,6 +94,7 @@ struct GainOverPrice {
     options: Options,
     gain: Gain,
     levels: Levels,
+    leap: Leap,
     ahead: Ahead,
     /// By node: its rank, where it was visited in the frame at hand.
     ranks: Vec<f64>,
@@ -257,6 +260,23 @@ impl GainOverPrice {
         is_enough.then_some(freed_ms)
     }
 
+    /// Refines what hides so much that all of it fits, where what ranks higher than `least`, by as much as
+    /// others make way for, does not fit otherwise.
+    fn leap(&mut self, frame: &FrameInput<'_>, least: f64, out: &mut Selection) {
+        let least = least * self.options.hysteresis;
+        let found = self.leap.find(frame, &out.front, least, &mut self.gain);
+        let Some(leapt) = found else { return };
+        for node in leapt.refined {
+            self.levels.refine(node);
+            for &child in frame.tree.children(node) {
+                self.levels.lose(child);
+            }
+        }
+        self.walk(frame);
+        self.front_into(out);
+        out.counted_on = leapt.hidden;
+    }
+
     /// How many nodes would be drawn in a frame of `ms` milliseconds, were they in memory, where the
     /// least rank of what is refined is `least`.
     fn lacking(&self, frame: &FrameInput<'_>, ms: f64, least: f64) -> u32 {
@@ -289,6 +309,9 @@ impl GainOverPrice {
                 }
             }));
         }
+        let missing = |&(child, _): &(u32, f64)| !frame.residents.contains(child);
+        let leap = self.leap.wanted(frame).filter(missing);
+        out.requests.extend(leap.map(|(child, rank)| (child, rank / self.options.hysteresis)));
     }
 }
 
@@ -323,11 +346,15 @@ impl Policy for GainOverPrice {
         self.front_into(out);
         let ms = self.relieve(frame, front_ms(frame, &out.front));
         let ms = self.refine(frame, ms);
+        let is_done = self.upgrades.is_empty() && ms <= frame.budget_ms;
         let least = self.worst(frame).map_or(0.0, |worst| self.ranks[worst as usize]);
         if self.levels.have_changed() {
             self.walk(frame);
             self.front_into(out);
             self.relieve_whole(frame, out);
+        }
+        if !is_done && self.leap.is_due(frame.dt_s) {
+            self.leap(frame, least, out);
         }
         out.lacking = self.lacking(frame, ms, least);
         self.request(frame, out);

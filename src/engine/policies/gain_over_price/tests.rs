@@ -1,5 +1,7 @@
 use super::*;
 use crate::camera::{View, from_angles};
+use crate::engine::HiddenNodes;
+use crate::engine::occlusion::test_wall;
 use crate::engine::test_frame::{TestFrame, passes_over_what_is_not_in_memory, root};
 use crate::mesh::UpAxis;
 use crate::random::Random;
@@ -270,4 +272,41 @@ fn is_below(frame: &TestFrame, mut node: u32, above: u32) -> bool {
         node = parent;
     }
     false
+}
+
+#[test]
+fn what_hides_the_rest_is_refined_though_there_is_time_for_it_only_then() {
+    // Near: 0 → 1, 2, which are a wall where 0 is not; behind it: 3 → 4, 5 and 6 → 7, 8.
+    let trees = vec![root(10.0, 0.1, 2), root(20.0, 0.01, 2), root(21.0, 0.01, 2)];
+    let mut frame = TestFrame::new(tree(trees));
+    frame.target_ms = 32.0;
+    let mut hidden = HiddenNodes::new(frame.tree.len(), 0.1);
+    hidden.set(1, Some(test_wall(10.5)));
+    let run = |frame: &TestFrame, hidden: &mut HiddenNodes, frames: usize| {
+        let mut policy = policy(&[]);
+        let mut fronts = Vec::new();
+        for _ in 0..frames {
+            hidden.begin_frame(&frame.view, frame.dt_s);
+            let mut out = Selection::default();
+            policy.select(&FrameInput { hidden: Some(hidden), ..frame.input() }, &mut out);
+            hidden.count_on(&out.counted_on);
+            let mut drawn = hidden.drawn(&frame.tree, &out.front, &frame.view).to_vec();
+            drawn.sort_unstable();
+            fronts.push(drawn);
+        }
+        fronts
+    };
+    let fronts = run(&frame, &mut hidden, 60);
+    let leapt = fronts.iter().position(|front| *front != [0, 3, 6]).unwrap();
+    assert!(leapt < 30, "{leapt}");
+    assert!(fronts[leapt..].iter().all(|front| *front == [1, 2]), "{fronts:?}");
+
+    // Nor is there time with it, without what makes the wall, or while it is not in memory.
+    frame.target_ms = 19.0;
+    assert_eq!(run(&frame, &mut hidden, 60).last().unwrap(), &[0, 3, 6]);
+    frame.target_ms = 32.0;
+    let mut bare = HiddenNodes::new(frame.tree.len(), 0.1);
+    assert_eq!(run(&frame, &mut bare, 60).last().unwrap(), &[0, 3, 6]);
+    frame.residents.set(1, false);
+    assert_eq!(run(&frame, &mut hidden, 60).last().unwrap(), &[0, 3, 6]);
 }

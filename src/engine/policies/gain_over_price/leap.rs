@@ -1,0 +1,154 @@
+//! Refining what hides the rest.
+//!
+//! Coarse façades hide nothing for sure, so that all of what is behind them is drawn, in the time in which
+//! they would be refined. Node by node there is no way out, though with them refined all of it may take less
+//! than before.
+
+use std::collections::{BTreeSet, BinaryHeap};
+
+use super::gain::Gain;
+use crate::engine::policies::ranked::{Ranked, added_ms, visible_children, wholly_refining_ms};
+use crate::engine::{FrameInput, FrontLoad};
+
+/// It is tried so often, seconds.
+const EVERY_S: f64 = 0.25;
+
+/// For so many times the budget nodes are refined to find out what they hide; one after the other.
+const STRETCHES: [f64; 4] = [1.2, 1.5, 2.0, 3.0];
+
+/// Many nodes that fit into the budget together, though one after the other they do not.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Leap {
+    since_s: f64,
+    /// Which stretch is tried next.
+    next: usize,
+    /// Nodes below the front that would be refined too, were their children in memory, with their ranks.
+    wanted: Vec<(u32, f64)>,
+}
+
+/// What comes of a leap.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Leapt {
+    /// Nodes that are refined by it, coarse to fine.
+    pub refined: Vec<u32>,
+    /// Nodes of the new front that the rest of it hides.
+    pub hidden: Vec<u32>,
+}
+
+impl Leap {
+    /// Whether it is time to try one.
+    pub fn is_due(&mut self, dt_s: f64) -> bool {
+        self.since_s += dt_s;
+        let is_due = self.since_s >= EVERY_S;
+        if is_due {
+            self.since_s = 0.0;
+        }
+        is_due
+    }
+
+    /// Tries one from a front that is full: nodes are refined by their rank for longer than there is time,
+    /// and in the time that is left without what they hide. One of them at least must rank higher than
+    /// `least`.
+    pub fn find(
+        &mut self,
+        frame: &FrameInput<'_>,
+        front: &[u32],
+        least: f64,
+        gain: &mut Gain,
+    ) -> Option<Leapt> {
+        let hidden = frame.hidden?;
+        let stretch_ms = STRETCHES[self.next % STRETCHES.len()] * frame.budget_ms;
+        self.next += 1;
+        let is_hidden = |node: u32| frame.is_hidden(node);
+        let mut more = Refined::of(frame, front, &is_hidden);
+        more.refine(stretch_ms, gain);
+        // What is drawn has its children asked for already.
+        let drawn: BTreeSet<u32> = front.iter().copied().collect();
+        self.wanted.clear();
+        let is_wanted = |&&(node, rank): &&(u32, f64)| rank > least && !drawn.contains(&node);
+        self.wanted.extend(more.lacking.iter().filter(is_wanted));
+        let behind = hidden.behind(frame.tree, &more.front, frame.view);
+        let is_hidden = |node: u32| behind.hides(node);
+        let mut leapt = Refined::of(frame, front, &is_hidden);
+        leapt.refine(frame.budget_ms, gain);
+        if leapt.highest <= least {
+            return None;
+        }
+        // Less is refined now, and may hide less.
+        let behind = hidden.behind(frame.tree, &leapt.front, frame.view);
+        if drawn_ms(frame, &leapt.front, &|node| behind.hides(node)) > frame.budget_ms {
+            return None;
+        }
+        let hidden = leapt.front.iter().copied().filter(|&node| behind.hides(node)).collect();
+        Some(Leapt { refined: leapt.nodes, hidden })
+    }
+
+    /// What is wanted in memory for it, with ranks.
+    pub fn wanted<'a>(
+        &'a self,
+        frame: &'a FrameInput<'_>,
+    ) -> impl Iterator<Item = (u32, f64)> + 'a {
+        self.wanted.iter().flat_map(|&(node, rank)| {
+            frame.tree.children(node).iter().map(move |&child| (child, rank))
+        })
+    }
+}
+
+/// A front that is refined.
+struct Refined<'a> {
+    frame: &'a FrameInput<'a>,
+    is_hidden: &'a dyn Fn(u32) -> bool,
+    front: Vec<u32>,
+    /// What was refined, coarse to fine.
+    nodes: Vec<u32>,
+    /// The highest rank of it.
+    highest: f64,
+    /// What would be refined too, were its children in memory, with ranks.
+    lacking: Vec<(u32, f64)>,
+}
+
+impl<'a> Refined<'a> {
+    fn of(frame: &'a FrameInput<'a>, front: &[u32], is_hidden: &'a dyn Fn(u32) -> bool) -> Self {
+        let (nodes, lacking) = (Vec::new(), Vec::new());
+        Self { frame, is_hidden, front: front.to_vec(), nodes, highest: 0.0, lacking }
+    }
+
+    /// Refines by rank what is not hidden until it takes so many milliseconds.
+    fn refine(&mut self, most_ms: f64, gain: &mut Gain) {
+        let &mut Self { frame, is_hidden, .. } = self;
+        let mut ms = drawn_ms(frame, &self.front, is_hidden);
+        let mut upgrades = BinaryHeap::new();
+        let mut push = |upgrades: &mut BinaryHeap<Ranked>, node: u32| {
+            if !frame.tree.children(node).is_empty() && !is_hidden(node) {
+                let rank = gain.of(frame, node) / wholly_refining_ms(frame, node);
+                if rank > 0.0 {
+                    upgrades.push(Ranked { rank, node });
+                }
+            }
+        };
+        self.front.iter().for_each(|&node| push(&mut upgrades, node));
+        while let Some(Ranked { rank, node }) = upgrades.pop() {
+            let drawn = visible_children(frame, node).filter(|&child| !is_hidden(child));
+            ms += added_ms(frame, node, drawn);
+            if ms > most_ms {
+                break;
+            } else if !frame.can_refine(node) {
+                self.lacking.push((node, rank));
+                continue;
+            }
+            self.highest = self.highest.max(rank);
+            self.nodes.push(node);
+            for child in visible_children(frame, node) {
+                self.front.push(child);
+                push(&mut upgrades, child);
+            }
+        }
+        let gone: BTreeSet<u32> = self.nodes.iter().copied().collect();
+        self.front.retain(|node| !gone.contains(node));
+    }
+}
+
+fn drawn_ms(frame: &FrameInput<'_>, front: &[u32], is_hidden: &dyn Fn(u32) -> bool) -> f64 {
+    let drawn: Vec<u32> = front.iter().copied().filter(|&node| !is_hidden(node)).collect();
+    frame.costs.priced_ms(&FrontLoad::default().of(frame.tree, &drawn, frame.view, 0))
+}
