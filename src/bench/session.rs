@@ -57,6 +57,11 @@ impl Session {
         Ok(())
     }
 
+    /// Its cells, where they were read.
+    pub fn cells(&self) -> Option<&Arc<Cells>> {
+        self.cells.as_ref()
+    }
+
     /// The output folder.
     pub fn dir(&self) -> &Path {
         &self.dir

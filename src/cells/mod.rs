@@ -10,11 +10,17 @@ mod cull_box;
 #[cfg(feature = "render")]
 mod face;
 mod options;
+#[cfg(feature = "render")]
+mod other_corners;
 mod places;
 #[cfg(feature = "render")]
 mod prepare;
+mod seen_faces;
 
 pub use options::{Balance, CellOptions};
+#[cfg(feature = "render")]
+pub use other_corners::seen_from_other_corners;
 pub use places::{along, around};
 #[cfg(feature = "render")]
 pub use prepare::{Prepared, Progress, prepare};
+pub use seen_faces::SeenFaces;

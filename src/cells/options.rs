@@ -1,13 +1,13 @@
 //! How cells are made.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
 
 /// By what the cull box of each cell is chosen: as the sum of the error of what is near, at the level that the
 /// triangles are enough for, and of the weighted error of what is far is least (Aliaga and others, 1999,
 /// section 3.3).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Balance {
     /// Triangles of what is near in a view, at most.
     pub triangles: u64,
@@ -23,7 +23,7 @@ impl Default for Balance {
 }
 
 /// How cells are made.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct CellOptions {
     /// Metres along the side of a cell.
     pub cell_m: f64,

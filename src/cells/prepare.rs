@@ -19,6 +19,11 @@ use crate::{Error, Result};
 /// The index is written again after so many cells, so that a run that is killed loses no more.
 const CELLS_BETWEEN: usize = 16;
 
+/// Those corners of a cell from which pictures are taken, from its middle, in halves of its side. From the
+/// others, which are opposite, none is.
+pub(super) const CORNERS: [[f64; 3]; 4] =
+    [[-1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [1.0, -1.0, 1.0], [-1.0, 1.0, 1.0]];
+
 /// Is told how far it is.
 pub trait Progress {
     /// So many cells are to be made; `known` are there from an earlier run.
@@ -136,6 +141,14 @@ fn remove_others(dir: &Path, cells: &Cells) {
     }
 }
 
+/// The least corner of a cell, and the box outside of which faces show what there is.
+pub(super) fn boxes(cell: &Cell, options: &CellOptions) -> (DVec3, [DVec3; 2]) {
+    let min = DVec3::from_array(cell.place.map(|at| at as f64)) * options.cell_m;
+    let [low, high] = cell.cull_box.map(DVec3::from_array);
+    let overlap = DVec3::splat(options.overlap_m(min.x - low.x));
+    (min, [low + overlap, high - overlap])
+}
+
 /// Draws, makes and writes the faces of a cell.
 fn cell(
     out: &Path,
@@ -209,7 +222,6 @@ fn cell(
 /// where most is seen that is hidden from there.
 fn viewpoints(options: &CellOptions) -> Vec<DVec3> {
     let half = options.cell_m / 2.0;
-    let corners = [[-1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [1.0, -1.0, 1.0], [-1.0, 1.0, 1.0]];
-    let corners = corners.map(|corner| DVec3::from(corner) * half);
+    let corners = CORNERS.map(|corner| DVec3::from(corner) * half);
     std::iter::once(DVec3::ZERO).chain(corners).collect()
 }

@@ -5,10 +5,13 @@ use std::path::Path;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::options::{Limits, VerifyOptions};
 use super::progress::Progress;
 use super::report::{Check, Failure};
+use crate::cells::SeenFaces;
 use crate::format::cells::{CELLS_DIR, CELLS_FILE, Cell, Cells, Face};
 use crate::format::{NodeMesh, Scene, file_crc, read_glb};
+use crate::{Error, Result};
 
 const AGAIN: &str = "make the cells again: hlod-build cells";
 
@@ -16,18 +19,23 @@ const AGAIN: &str = "make the cells again: hlod-build cells";
 const ROUNDING: f64 = 1e-6;
 
 /// Checks the cells of an output folder; none where it has no index of them.
-pub(super) fn cells(out: &Path, scene: &Scene, progress: &dyn Progress) -> Option<Check> {
+pub(super) fn cells(
+    out: &Path,
+    scene: &Scene,
+    options: &VerifyOptions,
+    progress: &dyn Progress,
+) -> Option<(Check, Vec<SeenFaces>)> {
     let mut check = Check::new("cells");
     let cells = match Cells::read(out) {
         Ok(cells) => cells?,
         Err(error) => {
             check.fail(CELLS_FILE, error.to_string(), AGAIN);
-            return Some(check);
+            return Some((check, Vec::new()));
         }
     };
     if let Err(error) = cells.check_scene(scene, out) {
         check.fail(CELLS_FILE, error.to_string(), AGAIN);
-        return Some(check);
+        return Some((check, Vec::new()));
     }
     progress.phase("reading cells", cells.cells.len() as u64);
     let failures: Vec<Vec<Failure>> = cells
@@ -52,7 +60,62 @@ pub(super) fn cells(out: &Path, scene: &Scene, progress: &dyn Progress) -> Optio
         cells.faces.len(),
         error * 1e3,
     );
-    Some(check)
+    let mut seen = Vec::new();
+    if check.passed && options.cells > 0 {
+        match drawn(out, options, progress) {
+            Ok(found) => {
+                judge(&found, &options.limits, &mut check);
+                seen = found;
+            }
+            Err(Error::NoAdapter(_)) => {
+                check.summary += "; not drawn: there is no graphics adapter";
+            }
+            Err(error) => check.fail(CELLS_DIR, error.to_string(), AGAIN),
+        }
+    }
+    Some((check, seen))
+}
+
+#[cfg(feature = "render")]
+fn drawn(out: &Path, options: &VerifyOptions, progress: &dyn Progress) -> Result<Vec<SeenFaces>> {
+    let begin = |cells: usize| progress.phase("drawing cells", cells as u64);
+    crate::cells::seen_from_other_corners(out, options.cells, &begin, &|| progress.done(1))
+}
+
+#[cfg(not(feature = "render"))]
+fn drawn(_: &Path, _: &VerifyOptions, _: &dyn Progress) -> Result<Vec<SeenFaces>> {
+    Err(Error::NoAdapter("built without the renderer".into()))
+}
+
+/// Fails where faces show too little of what they should, or something else.
+fn judge(seen: &[SeenFaces], limits: &Limits, check: &mut Check) {
+    let sum = |of: fn(&SeenFaces) -> u64| seen.iter().map(of).sum::<u64>() as f64;
+    let pixels = sum(|seen| seen.pixels).max(1.0);
+    let [missing, wrong] = [sum(|seen| seen.missing), sum(|seen| seen.wrong)];
+    check.summary += &format!(
+        "; from corners that no picture was taken from, {} of them miss {:.3} % of what is far and show {:.3} % \
+         of it wrongly",
+        seen.len(),
+        100.0 * missing / pixels,
+        100.0 * wrong / pixels,
+    );
+    for seen in seen {
+        let of = |pixels: u64| pixels as f64 / seen.pixels.max(1) as f64;
+        let [i, j, k] = seen.place;
+        for (found, most, what) in [
+            (of(seen.missing), limits.missing_of_faces, "missing"),
+            (of(seen.wrong), limits.wrong_of_faces, "shown wrongly"),
+        ] {
+            if found > most {
+                let what = format!(
+                    "{:.2} % of what is far is {what}, expected {:.2} % at most",
+                    100.0 * found,
+                    100.0 * most
+                );
+                check.fail(format!("the cell {i}, {j}, {k}"), what, AGAIN);
+            }
+        }
+    }
 }
 
 /// What is wrong with a face.

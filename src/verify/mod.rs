@@ -103,6 +103,7 @@ pub fn verify(
         worst_nodes: Vec::new(),
         gaps: Vec::new(),
         slits: Vec::new(),
+        cells: Vec::new(),
     };
     let path = out.join(SCENE_FILE);
     let bytes = std::fs::read(&path)
@@ -146,7 +147,10 @@ impl Verification<'_> {
         report.other_sources = other_sources::other_sources(out, sources)?;
         let (mut geometry, check) = structure::structure(out, scene, &options.limits, progress);
         report.checks.push(check);
-        report.checks.extend(cells::cells(out, scene, progress));
+        if let Some((check, seen)) = cells::cells(out, scene, options, progress) {
+            report.checks.push(check);
+            report.cells = seen;
+        }
         if geometry.iter().any(|node| node.triangles.is_empty()) {
             // What is missing would fail every other check too, and hide its own faults.
             return Ok(());

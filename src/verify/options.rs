@@ -15,13 +15,23 @@ pub struct VerifyOptions {
     /// Where given, a front of mixed levels is measured as well, cut where the stored errors say, of
     /// at most this share of the leaves' triangles; over 0, at most 1.
     pub front: Option<f64>,
+    /// Cells of which faces are drawn, at most, spread evenly over all; 0 draws none, and needs no graphics
+    /// adapter.
+    pub cells: usize,
     /// See [`Limits`].
     pub limits: Limits,
 }
 
 impl Default for VerifyOptions {
     fn default() -> Self {
-        Self { samples: 300_000, seed: 1, worst: 5, front: None, limits: Limits::default() }
+        Self {
+            samples: 300_000,
+            seed: 1,
+            worst: 5,
+            front: None,
+            cells: 8,
+            limits: Limits::default(),
+        }
     }
 }
 
@@ -64,6 +74,10 @@ pub struct Limits {
     pub wrong_tiles: f64,
     /// Likewise for a single leaf: a few of its samples may lie where JPEG spoiled the number.
     pub leaf_wrong_tiles: f64,
+    /// Share of the pixels of what is far that may be missing where it is drawn from faces.
+    pub missing_of_faces: f64,
+    /// Share of them that may show something else, or at another distance.
+    pub wrong_of_faces: f64,
     /// Gap that counts as none, in steps of the lattice that f32 has over the extent: corners of
     /// skirts are rounded to it.
     pub gap_steps: f64,
@@ -82,6 +96,8 @@ impl Default for Limits {
             leaf_texel_slack: 8.0,
             wrong_tiles: 0.01,
             leaf_wrong_tiles: 0.1,
+            missing_of_faces: 0.005,
+            wrong_of_faces: 0.02,
             gap_steps: 4.0,
         }
     }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::options::VerifyOptions;
+use crate::cells::SeenFaces;
 use crate::mesh::Kept;
 use crate::{Error, Result};
 
@@ -44,6 +45,8 @@ pub struct VerifyReport {
     /// Slits between borders of the source that touch without sharing vertices, for every pair of
     /// levels that meet so somewhere; `a` ≤ `b`.
     pub slits: Vec<SlitFigures>,
+    /// Faces from corners that no picture was taken from, by cell; none where none was drawn.
+    pub cells: Vec<SeenFaces>,
 }
 
 impl VerifyReport {

@@ -12,6 +12,7 @@ use hlod::camera::{
 };
 use hlod::city::{CityOptions, TextureSize};
 use hlod::format::cells::Cells;
+use hlod::format::{NodeLabel, NodeMesh, file_crc, read_glb, write_glb};
 use hlod::picture_error::{Gaps, mean_squared_error, psnr};
 use hlod::render::{RenderOptions, Side};
 use image::{DynamicImage, GrayImage, Luma, Rgba, RgbaImage};
@@ -259,7 +260,7 @@ fn no_cells_are_made_of_a_scene_whose_files_are_damaged() {
 fn verify_reads_cells_and_names_what_is_wrong_with_them() {
     let Some(place) = with_cells(&[]) else { return };
     let verified = |expected: &str, passes: bool| {
-        let done = hlod_build(&place, &["verify", "out", "--samples", "1000"]);
+        let done = hlod_build(&place, &["verify", "out", "--samples", "1000", "--cells", "0"]);
         let text = String::from_utf8_lossy(&done.stdout).into_owned();
         let found = if passes { "pass  cells:" } else { "FAIL  cells" };
         assert!(text.contains(found) && text.contains(expected), "{text}");
@@ -285,6 +286,53 @@ fn verify_reads_cells_and_names_what_is_wrong_with_them() {
     fs::write(&index, &whole).unwrap();
     fs::remove_dir_all(place.out().join("cells")).unwrap();
     verified("cannot be read", false);
+}
+
+/// The index and the files of cells with the meshes of all faces changed.
+fn change_faces(place: &Place, change: &dyn Fn(&mut NodeMesh)) {
+    let mut cells = cells(place);
+    for (face, direction) in cells.faces.iter_mut().zip(0..) {
+        let path = place.out().join("cells").join(&face.file);
+        let mut mesh = read_glb(&fs::read(&path).unwrap(), &path).unwrap();
+        change(&mut mesh);
+        let at = |at: &[f32; 3]| DVec3::from(mesh.origin) + DVec3::from(at.map(f64::from));
+        let all = || mesh.primitives.iter().flat_map(|part| &part.positions).map(at);
+        face.bounds = [
+            all().fold(DVec3::INFINITY, DVec3::min).to_array(),
+            all().fold(DVec3::NEG_INFINITY, DVec3::max).to_array(),
+        ];
+        let triangles = mesh.primitives.iter().map(|part| part.indices.len() as u32 / 3);
+        face.triangles = triangles.sum();
+        let label = NodeLabel { id: direction, level: 0 };
+        let bytes = write_glb(&mesh, place.scene().up, label).unwrap();
+        (face.file_bytes, face.file_crc) = (bytes.len() as u64, file_crc(&bytes));
+        fs::write(&path, bytes).unwrap();
+    }
+    fs::write(place.out().join("cells.hlod"), cells.to_bytes().unwrap()).unwrap();
+}
+
+#[test]
+fn verify_sees_what_faces_miss_and_what_they_show_wrongly() {
+    let verified = |place: &Place, expected: &str| {
+        let arguments = ["verify", "out", "--samples", "1000", "--cells", "1000"];
+        let done = hlod_build(place, &arguments);
+        let text = String::from_utf8_lossy(&done.stdout).into_owned();
+        assert!(text.contains(expected), "{expected}: {text}");
+    };
+    let Some(place) = with_cells(&[]) else { return };
+    verified(&place, "pass  cells:");
+    // From where the pictures were taken the same is seen of it, and from elsewhere another side.
+    change_faces(&place, &|mesh| {
+        let farther = |at: &mut [f32; 3]| *at = at.map(|at| at * 1.5);
+        mesh.primitives.iter_mut().flat_map(|part| &mut part.positions).for_each(farther);
+    });
+    verified(&place, "is shown wrongly");
+    let place = with_cells(&[]).unwrap();
+    change_faces(&place, &|mesh| {
+        let part = &mut mesh.primitives[0];
+        part.indices.truncate(part.indices.len() / 6 * 3);
+    });
+    verified(&place, "is missing");
 }
 
 const RUN: [&str; 12] = [

@@ -36,6 +36,9 @@ pub struct VerifyArgs {
     /// of the leaves' triangles, above 0 and up to 1
     #[arg(long, value_name = "SHARE")]
     front: Option<f64>,
+    /// Cells of which faces are drawn, at most, from corners that no picture was taken from; 0 draws none
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    cells: usize,
     /// Number of worst nodes to list
     #[arg(long, value_name = "N", default_value_t = 5)]
     worst: usize,
@@ -54,6 +57,7 @@ pub fn verify_scene(arguments: &VerifyArgs) -> Result<ExitCode> {
         seed: arguments.seed,
         worst: arguments.worst,
         front: arguments.front,
+        cells: arguments.cells,
         ..Default::default()
     };
     let bar = PhaseBar::new(arguments.quiet);

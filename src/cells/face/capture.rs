@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 use super::Captured;
 use crate::bench::{ReferenceRenderer, Session};
@@ -43,15 +43,20 @@ impl Capture {
         Ok(Self { renderer, up: session.scene().up, dir: session.dir().to_owned() })
     }
 
+    /// Of a camera that looks in a direction, by yaw and pitch.
+    pub fn rotation(&self, [yaw, pitch]: [f64; 2]) -> DQuat {
+        from_angles(self.up, yaw, pitch, 0.0)
+    }
+
     /// What is seen in a direction of the outside of a box; none where nothing is.
     pub fn draw(
         &mut self,
         eye: DVec3,
         outside_of: [DVec3; 2],
-        [yaw, pitch]: [f64; 2],
+        direction: [f64; 2],
         options: &CellOptions,
     ) -> Result<Option<Captured>> {
-        let rotation = from_angles(self.up, yaw, pitch, 0.0);
+        let rotation = self.rotation(direction);
         let pose = Pose { position: eye, rotation, fov_y_deg: options.fov_deg() };
         let view = View::new(pose, DVec3::ZERO, [options.pixels; 2]);
         let nodes = front(self.renderer.tree(), &view, outside_of);

@@ -28,7 +28,7 @@ use crate::texture::{FacePicture, face_picture};
 const APART_PX: f32 = 0.5;
 
 /// A picture of what is outside of a cull box, in one of six directions.
-pub(super) struct Captured {
+pub(in crate::cells) struct Captured {
     /// Alpha is 0 where nothing is.
     pub picture: RgbaImage,
     /// Metres along the view, row by row; infinite where nothing is.
