@@ -20,6 +20,10 @@ FRAMES, SETTLE, EVERY = 300, 100, 15
 # Triangles of what is near in a view, by which cull boxes are chosen: the default.
 NEAR = [50_000]
 WAYS = ["off", "cells", "auto"]
+# Where eyes are in no cell.
+ELSEWHERE = ["fly", "rise"]
+# What the paper's system held of its model, and is allowed of all that a scene takes in memory.
+PART_IN_MEMORY = 0.11
 # Streets of which pictures are shown: the first frame of a walk, at a target in milliseconds.
 PICTURES = {"city": 30, "hamada": 10}
 # Pictures in a report.
@@ -38,7 +42,7 @@ def main():
     names = [] if arguments.quick or arguments.no_real else REAL
     scenes = [("city", [programs.city("cells-city", **CITY)])]
     scenes += [(name, models) for name in names if (models := real_data(name))]
-    made, drawn, pictures = [], [], []
+    made, drawn, elsewhere, capped, pictures = [], [], [], [], []
     for name, models in scenes:
         out = programs.work / f"scene-cells-{name}"
         run([programs.path("hlod-build"), "--quiet", *map(str, models), str(out)])
@@ -53,9 +57,18 @@ def main():
                 ways["auto"] = replay(programs, out, paths[at[0]], at[1], "auto")
                 of_run = f"{what}: {at[0]}, {at[1]} ms"
                 drawn.append([of_run, *compared({"off": alone[at], **ways})])
+        target = TARGETS_MS[0]
+        for kind in [] if arguments.quick else ELSEWHERE:
+            route = path(programs, out, kind, frames)
+            ways = [replay(programs, out, route, target, way) for way in WAYS]
+            elsewhere.append([f"{name}: {kind}, {target} ms", *beside(ways)])
+        for kind in kinds:
+            cap = int(PART_IN_MEMORY * alone[kind, target]["scene"])
+            ways = [replay(programs, out, paths[kind], target, way, cap=cap) for way in WAYS]
+            capped.append([f"{name}: {kind}, {target} ms", f"{cap / 2**20:.0f}", *held(ways)])
         if name in PICTURES and arguments.write:
             pictures.append(street(programs, out, name, paths["walk"]))
-    text = "\n\n".join([made_on, tables(made, drawn, frames), *pictures]) + "\n"
+    text = "\n\n".join([made_on, tables(made, drawn, elsewhere, capped, frames), *pictures]) + "\n"
     print(text)
     if arguments.write:
         write_between_markers(DOCS / "cells.md", "cells", text)
@@ -78,7 +91,8 @@ def path(programs, out, kind, frames):
 
 
 def prepare(programs, out, paths, near):
-    """Number of cells, metres to the sides of their cull boxes, cells a minute, faces, triangles and KB of a face."""
+    """Number of cells, metres to the sides of their cull boxes, cells a minute, faces, triangles and KB of a face, and
+    what is missing and wrong as seen from corners that no picture was taken from."""
     shutil.rmtree(out / "cells", ignore_errors=True)
     (out / "cells.hlod").unlink(missing_ok=True)
     begin = time.monotonic()
@@ -89,21 +103,35 @@ def prepare(programs, out, paths, near):
     files = list((out / "cells").glob("*.glb"))
     size = sum(file.stat().st_size for file in files)
     triangles = int(text.split("faces: ")[1].split()[0])
-    least, most = re.search(r"cull boxes of (\d+) to (\d+) m", text).groups()
+    least, most = re.search(r"cull boxes of (?:(\d+) to )?(\d+) m", text).groups()
     return [
         str(cells),
-        least if least == most else f"{least}–{most}",
+        f"{least}–{most}" if least else most,
         f"{60 * cells / seconds:.0f}",
         f"{len(files) / cells:.1f}",
         f"{triangles:,}",
         f"{size / len(files) / 1e3:.0f}",
+        unseen(programs, out),
     ]
 
 
-def replay(programs, out, path, target, far_field, every=EVERY, pops=()):
+def unseen(programs, out):
+    """Percent of what is far that is missing, and that is wrong, from corners that no picture was taken from."""
+    command = [programs.path("hlod-build"), "verify", str(out), "--json", "--quiet", "--samples", "1000"]
+    text = subprocess.run(command, stdout=subprocess.PIPE, text=True).stdout
+    cells = json.loads(text)["cells"]
+
+    def part(name):
+        return 100 * sum(cell[name] for cell in cells) / sum(cell["pixels"] for cell in cells)
+
+    return f"{part('missing'):.2f} / {part('wrong'):.2f}"
+
+
+def replay(programs, out, path, target, far_field, every=EVERY, pops=(), cap=None):
     result = programs.work / f"cells-run-{far_field}"
     run([programs.path("hlod-bench"), str(out), str(path), *CLOCK, "--quiet"]
         + ["--target-ms", str(target), "--warm-up-frames", str(SETTLE), *pops]
+        + ([] if cap is None else ["--max-memory", str(cap)])
         + ["--reference-every", str(every), "--far-field", far_field, "--out", str(result)])
     with open(result / "frames.csv", newline="") as file:
         frames = list(csv.DictReader(file))
@@ -130,6 +158,9 @@ def replay(programs, out, path, target, far_field, every=EVERY, pops=()):
         "flip": mean("flip_mean", looked),
         "gaps": sum(int(frame["inner_gap_pixels"]) for frame in looked)
         / max(1, sum(int(frame["reference_pixels"]) for frame in looked)),
+        "scene": summary["memory"]["scene_bytes"],
+        "reread": sum(float(frame["reread_bytes"]) for frame in frames),
+        "lacking": summary["loading"]["lacking_percent"],
         "memory": max(float(frame["memory_bytes"]) for frame in frames),
         "frames": summary["far_field"]["frames_percent"],
         "toggle": pop("0"),
@@ -156,6 +187,31 @@ def compared(ways):
     ]
 
 
+def beside(ways):
+    """Of runs by each way."""
+    def of(name, form):
+        return " / ".join(form(way[name]) for way in ways)
+
+    return [
+        " / ".join(f"{way['frames']:.0f}" for way in ways[1:]),
+        of("p95", "{:.1f}".format),
+        of("flip", "{:.4f}".format),
+    ]
+
+
+def held(ways):
+    """Of runs by each way under a cap."""
+    def of(name, form):
+        return " / ".join(form(way[name]) for way in ways)
+
+    return [
+        *beside(ways),
+        of("lacking", "{:.1f}".format),
+        of("memory", lambda size: f"{size / 2**20:.0f}"),
+        of("reread", lambda size: f"{size / 1e6:.1f}"),
+    ]
+
+
 def street(programs, out, name, path):
     """The first frame of a walk by the hierarchy alone, with cells, and of the leaves, as one picture."""
     target = PICTURES[name]
@@ -176,19 +232,28 @@ def street(programs, out, name, path):
     return f"![{caption}](cells/{name}.jpg)\n\n*{caption}.*"
 
 
-def tables(made, drawn, frames):
+def tables(made, drawn, elsewhere, capped, frames):
     head = ["cells", "number", "m to the box", "a minute", "faces each", "triangles a face", "KB a face"]
+    head += ["% missing / wrong"]
     of_runs = ["run", "% of frames", "ms, p95", "thousand triangles", "% of those in the frustum"]
+    of_any = ["run", "% of frames", "ms, p95", "FLIP"]
+    under_cap = ["run", "cap, MiB", *of_any[1:], "% of frames lack a node", "MiB", "MB read again"]
     of_runs += ["FLIP", "gaps, millionths", "MiB", "toggle / change of cell, FLIP"]
     return (
         "Made along a walk and a drive, cells of 4 m, faces of 512 pixels; *cells* are named by the triangles of what is "
         "near in a view, by which cull boxes are chosen (`--triangles`):\n\n"
         + table(head, made)
+        + "\n*Missing* and *wrong* are parts of what is far, as seen from corners of cells that no picture was taken "
+        "from (`hlod-build verify`).\n"
         + f"\nThe default policy over {frames} frames, by the model clock, 1280 × 720: *`--far-field off` / `cells` / "
         "`auto`*, and in how many frames a cell was drawn by the last two. *Those in the frustum* are the source's "
         "triangles. Gaps are pixels with background where the leaves have surface that no outline explains. Changes are "
         "means over frames in which levels toggled (`off`), and in which the cell changed (`cells`), on walks at 30 ms:\n\n"
         + table(of_runs, drawn)
+        + (f"\nWhere eyes are in no cell:\n\n{table(of_any, elsewhere)}" if elsewhere else "")
+        + f"\nUnder a cap of {100 * PART_IN_MEMORY:.0f} % of what all of the scene takes in memory; a frame that lacks a "
+        "node would have drawn it in place of a coarser one:\n\n"
+        + table(under_cap, capped)
     ).strip()
 
 

@@ -43,6 +43,8 @@ pub struct Run {
     pub start_bytes: u64,
     /// The most bytes that were ever in use, also between frames.
     pub peak_bytes: u64,
+    /// Bytes that all nodes would take.
+    pub scene_bytes: u64,
 }
 
 /// Replays a path; `progress` is told of each frame that is done and ends the run where it says
@@ -121,7 +123,8 @@ pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -
             break;
         }
     }
-    Ok(Run { frames, start_bytes: engine.start_bytes(), peak_bytes: engine.peak_bytes()? })
+    let [peak_bytes, scene_bytes] = [engine.peak_bytes()?, engine.scene_bytes()?];
+    Ok(Run { frames, start_bytes: engine.start_bytes(), peak_bytes, scene_bytes })
 }
 
 /// Seconds from a frame to the next, as recorded; the last lasts as long as the one before.

@@ -123,6 +123,7 @@ pub fn summary(run: &Run, context: &Context) -> Value {
             "start_bytes": run.start_bytes,
             "peak_bytes": run.peak_bytes,
             "peak_share": run.peak_bytes as f64 / cap as f64,
+            "scene_bytes": run.scene_bytes,
             "mean_bytes": mean(of(|frame| frame.report.memory_bytes as f64)),
             "process_peak_bytes": frames.iter().map(|frame| frame.process_bytes).max(),
         },
@@ -345,11 +346,12 @@ pub fn summary_text(summary: &Value) -> String {
     line(
         "memory",
         format!(
-            "{:.1} MiB at first, {:.1} at most, {:.1} % of the cap of {:.1}",
+            "{:.1} MiB at first, {:.1} at most, {:.1} % of the cap of {:.1}; {:.1} for all of the scene",
             mib("/memory/start_bytes"),
             mib("/memory/peak_bytes"),
             number("/memory/peak_share") * 100.0,
-            mib("/memory/cap_bytes")
+            mib("/memory/cap_bytes"),
+            mib("/memory/scene_bytes")
         ),
     );
     line(

@@ -8,7 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::cull_box::cull_m;
-use super::face::{Capture, DIRECTIONS, Layer, Made};
+use super::face::{BEHIND_PX, Capture, DIRECTIONS, Layer, Made};
 use super::options::CellOptions;
 use crate::bench::Session;
 use crate::bench::write_beside;
@@ -167,7 +167,8 @@ fn cell(
     // Vertices are relative to it, and it stands in a file of f32.
     let eye = ((min + max) / 2.0).as_vec3().as_dvec3();
     let mut layers: [Vec<Layer>; DIRECTIONS.len()] = Default::default();
-    for offset in viewpoints(options) {
+    let nearest_m = eye.x - shown[0].x;
+    for offset in viewpoints(options, nearest_m) {
         // The surface is made for an eye that moves from where the camera stands to anywhere in the cell.
         let reach_m = options.reach_m() + offset.length();
         let is_middle = offset == DVec3::ZERO;
@@ -219,8 +220,12 @@ fn cell(
 }
 
 /// Where pictures are taken, metres from a cell's middle: there, and from every other of its corners, from
-/// where most is seen that is hidden from there.
-fn viewpoints(options: &CellOptions) -> Vec<DVec3> {
+/// where most is seen that is hidden from there. Not where all that is shown is as far as `nearest_m` metres and
+/// moves by so little that what is behind it, which goes on under it, covers what comes to be seen.
+fn viewpoints(options: &CellOptions, nearest_m: f64) -> Vec<DVec3> {
+    if options.reach_m() * options.focal_px() <= BEHIND_PX * nearest_m {
+        return vec![DVec3::ZERO];
+    }
     let half = options.cell_m / 2.0;
     let corners = CORNERS.map(|corner| DVec3::from(corner) * half);
     std::iter::once(DVec3::ZERO).chain(corners).collect()

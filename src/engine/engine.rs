@@ -393,6 +393,11 @@ impl<'a> Engine<'a> {
         self.start_bytes
     }
 
+    /// Bytes that all nodes would take in memory.
+    pub fn scene_bytes(&self) -> Result<u64> {
+        Ok(lock(&self.residency)?.scene_bytes())
+    }
+
     /// The most bytes that were ever in use, also between frames, under whatever cap.
     pub fn peak_bytes(&self) -> Result<u64> {
         Ok(lock(&self.residency)?.peak_bytes())

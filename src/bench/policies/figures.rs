@@ -201,7 +201,7 @@ mod tests {
         // Late for 0.2 s, and from 0.6 s to the end.
         let times = [10.0, 12.0, 12.0, 10.0, 10.0, 10.0, 12.0, 12.0, 12.0, 12.0];
         let frames = times.iter().zip(0..).map(|(&ms, index)| frame(index, ms)).collect();
-        let run = Run { frames, start_bytes: 0, peak_bytes: 5_000_000 };
+        let run = Run { frames, start_bytes: 0, peak_bytes: 5_000_000, scene_bytes: 0 };
         let key = RunKey { policy: "x".into(), path: PathKind::Walk, seed: 0, target_ms: 10.0 };
         let found = PolicyRun::new("city", key, &run, Inspected { every: 4, every_toggle: true });
         for (name, expected) in [

@@ -47,6 +47,7 @@ fn frames(count: usize, levels: usize) -> Run {
         frames: (0..count).map(frame).collect(),
         start_bytes: 160 << 20,
         peak_bytes: 1_000_000_000,
+        scene_bytes: 2_000_000_000,
     }
 }
 

@@ -143,6 +143,8 @@ fn a_walk_starts_with_the_roots_and_gets_finer_as_nodes_arrive() {
     assert_eq!(first.report.nodes_by_level[1..], [0, 0]);
     assert_eq!(first.report.resident, 20);
     assert_eq!(run.start_bytes, 20 * 200);
+    let nodes = street(20).nodes.len() as u64;
+    assert_eq!(run.scene_bytes, nodes * 200);
     let last = run.frames.last().unwrap();
     assert!(last.report.nodes_by_level[2] > 0, "{last:?}");
     assert!(run.frames.iter().map(|frame| frame.report.toggles_up).sum::<u32>() > 0);

@@ -75,13 +75,13 @@ pub fn cells(arguments: &CellsArgs) -> Result<()> {
         return Ok(());
     }
     let faces = prepared.faces.max(1) as u64;
+    let [least, most] = prepared.cull_m.map(|metres| format!("{metres:.0}"));
+    let boxes = if least == most { least } else { format!("{least} to {most}") };
     print(&format!(
-        "{} cells, {} of them from earlier; cull boxes of {:.0} to {:.0} m; {} faces: {} triangles and {} \
+        "{} cells, {} of them from earlier; cull boxes of {boxes} m; {} faces: {} triangles and {} \
          bytes each on average\n",
         prepared.cells,
         prepared.known,
-        prepared.cull_m[0],
-        prepared.cull_m[1],
         prepared.faces,
         prepared.triangles / faces,
         prepared.bytes / faces,

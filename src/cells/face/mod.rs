@@ -12,6 +12,7 @@ pub(super) use capture::{Capture, DIRECTIONS};
 use depths::Depths;
 use glam::{DQuat, DVec3, Vec3};
 use image::RgbaImage;
+pub(super) use parallax_mesh::BEHIND_PX;
 use parallax_mesh::ParallaxMesh;
 use parallax_simplify::simplified;
 use patches::patches;

@@ -11,6 +11,9 @@ const CORNERS: [[isize; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
 /// moves: slits of a pixel or two were left without.
 const GOES_ON_PX: usize = 2;
 
+/// With the edge itself.
+pub const BEHIND_PX: f64 = GOES_ON_PX as f64 + 1.0;
+
 /// A surface in the space of [`Depths`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParallaxMesh {

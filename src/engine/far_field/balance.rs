@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::FarField;
 use crate::engine::policies::{Outlook, part_of_picture, wrong};
 use crate::engine::{FrameInput, HiddenNodes, Visibility};
+use crate::format::cells::Cell;
 
 /// It is weighed so often, seconds.
 const EVERY_S: f64 = 0.25;
@@ -110,6 +111,19 @@ impl Balance {
         if self.use_faces != far_field.shown.cull_box.is_some() {
             return;
         }
+        let (expected, found) = self.pictures(far_field, cell, frame, front, covered);
+        self.decide(expected, found, since_s.max(0.0));
+    }
+
+    /// What the hierarchy alone and it with faces are expected to come to, and what the way in use does.
+    fn pictures(
+        &mut self,
+        far_field: &FarField,
+        cell: &Cell,
+        frame: &FrameInput<'_>,
+        front: &[u32],
+        covered: f64,
+    ) -> ([Picture; 2], Picture) {
         for visibility in [&mut self.alone, &mut self.beside, &mut self.in_sight] {
             visibility.begin_frame(frame.tree.len());
         }
@@ -117,45 +131,47 @@ impl Balance {
             let hides = |hidden: &HiddenNodes| hidden.is_behind(frame.tree, node, frame.view);
             !self.in_sight.get_or(node, || !frame.hidden.is_some_and(hides))
         };
-        // What is counted on of the hierarchy alone, and with faces.
-        let mut counted_on = [COUNTED_ON; 2];
-        counted_on[usize::from(self.use_faces)] = 1.0;
         let alone = FrameInput { visibility: &self.alone, hidden: None, ..*frame };
         let faces = far_field.in_view(cell, frame.view);
         let faces_ms = frame.costs.added_ms(&far_field.load_of(&faces, frame.view, covered));
         let view = frame.view.within(Some(cell.cull_box.map(DVec3::from_array)));
         let (visibility, budget_ms) = (&self.beside, (frame.budget_ms - faces_ms).max(0.0));
         let beside = FrameInput { view: &view, visibility, budget_ms, ..alone };
-        let outlook = |frame: &FrameInput<'_>, counted_on: f64| {
-            let budget_ms = frame.budget_ms * counted_on;
+        let outlook = |frame: &FrameInput<'_>, is_in_use: bool| {
+            let budget_ms = frame.budget_ms * if is_in_use { 1.0 } else { COUNTED_ON };
             Outlook::of(&FrameInput { budget_ms, ..*frame }, &is_hidden)
         };
-        let [whole, near] = [outlook(&alone, counted_on[0]), outlook(&beside, counted_on[1])];
-        let now = front.iter().copied().filter(|&node| !is_hidden(node)).collect();
+        let whole = outlook(&alone, !self.use_faces);
+        let near = outlook(&beside, self.use_faces);
 
         let is_far = |&node: &u32| !beside.is_visible(node);
         let far_of = |front: &[u32]| {
             Outlook::from_front(front.iter().copied().filter(is_far).collect(), &alone)
         };
-        let part: f64 =
+        let far_part: f64 =
             far_of(&whole.front).front.iter().map(|&node| part_of_picture(&alone, node)).sum();
         let texel_px = FACE_TEXELS * far_field.texel() * frame.view.pixels_per_metre();
-        let faces_wrong = FAR_WEIGHT * part * wrong(texel_px);
-        let without = |of: &Outlook| Picture {
+        let without_faces = |of: &Outlook| Picture {
             over_ms: over_ms(of, &alone),
             wrong: of.wrong(&alone) + (FAR_WEIGHT - 1.0) * far_of(&of.front).wrong(&alone),
         };
-        let with = |of: &Outlook| Picture {
+        let with_faces = |of: &Outlook| Picture {
             over_ms: over_ms(of, &beside),
-            wrong: of.wrong(&beside) + faces_wrong,
+            wrong: of.wrong(&beside) + FAR_WEIGHT * far_part * wrong(texel_px),
         };
-        let expected = [without(&whole), with(&near)];
+        let now = front.iter().copied().filter(|&node| !is_hidden(node)).collect();
         let found = match self.use_faces {
-            false => without(&Outlook::from_front(now, &alone)),
-            true => with(&Outlook::from_front(now, &beside)),
+            false => without_faces(&Outlook::from_front(now, &alone)),
+            true => with_faces(&Outlook::from_front(now, &beside)),
         };
+        ([without_faces(&whole), with_faces(&near)], found)
+    }
+
+    /// Changes to the other way where that is expected to be better than what was found of the one in use,
+    /// `since_s` seconds after both were weighed last.
+    fn decide(&mut self, expected: [Picture; 2], found: Picture, since_s: f64) {
         let (now, other) = (usize::from(self.use_faces), usize::from(!self.use_faces));
-        let kept = libm::exp2(-since_s.max(0.0) / HALF_LIFE_S);
+        let kept = libm::exp2(-since_s / HALF_LIFE_S);
         self.fell_short = self.fell_short.map(|short| Picture::default().and(short, kept));
         let promised = self.promised.take().unwrap_or(expected[now]);
         self.fell_short[now] = self.fell_short[now].or_more(found.more(promised));
@@ -189,7 +205,7 @@ mod tests {
     use super::*;
     use crate::engine::FarFieldMode;
     use crate::engine::test_frame::{TestFrame, root};
-    use crate::format::cells::{Cell, Cells};
+    use crate::format::cells::Cells;
     use crate::runtime::test_tree::tree;
 
     fn picture(over_ms: f64, wrong: f64) -> Picture {

@@ -107,6 +107,7 @@ impl Residency {
             counters: Counters::default(),
             roots: tree.roots().len(),
             least_bytes: 0,
+            scene_bytes: sizes.bytes_of(tree.len()),
             options,
             sizes,
         };

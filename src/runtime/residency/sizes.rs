@@ -75,6 +75,12 @@ impl Sizes {
         Self { nodes, textures }
     }
 
+    /// Of the first so many of nodes, and of all pictures that nodes share, held for drawing and beside it.
+    pub fn bytes_of(&self, nodes: usize) -> u64 {
+        let pictures: u64 = self.textures.iter().map(|texture| texture.held_bytes).sum();
+        self.nodes.iter().take(nodes).map(NodeSize::bytes).sum::<u64>() + pictures
+    }
+
     /// The same with the faces of cells after the nodes; `face` says how many bytes one holds for drawing:
     /// of vertices, triangles and pictures.
     pub fn with_faces(

@@ -131,6 +131,8 @@ pub struct Residency {
     pub(super) roots: usize,
     /// The least cap that there may be, bytes.
     pub(super) least_bytes: u64,
+    /// Of all nodes of the hierarchy, bytes.
+    pub(super) scene_bytes: u64,
 }
 
 impl Residency {
@@ -158,6 +160,11 @@ impl Residency {
     /// The most bytes that were ever in use, under whatever cap.
     pub fn peak_bytes(&self) -> u64 {
         self.budget.peak()
+    }
+
+    /// Bytes that all nodes of the hierarchy would take, without the faces of cells.
+    pub fn scene_bytes(&self) -> u64 {
+        self.scene_bytes
     }
 
     /// The cap, and the bytes in use.
