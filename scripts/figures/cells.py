@@ -22,6 +22,8 @@ NEAR = [50_000]
 WAYS = ["off", "cells", "auto"]
 # Where eyes are in no cell.
 ELSEWHERE = ["fly", "rise"]
+# Policies that are compared with and without cells.
+POLICIES = ["gain-over-price", "best-first", "lakhia"]
 # What the paper's system held of its model, and is allowed of all that a scene takes in memory.
 PART_IN_MEMORY = 0.11
 # Streets of which pictures are shown: the first frame of a walk, at a target in milliseconds.
@@ -42,7 +44,7 @@ def main():
     names = [] if arguments.quick or arguments.no_real else REAL
     scenes = [("city", [programs.city("cells-city", **CITY)])]
     scenes += [(name, models) for name in names if (models := real_data(name))]
-    made, drawn, elsewhere, capped, pictures = [], [], [], [], []
+    made, drawn, elsewhere, capped, pictures, policies = [], [], [], [], [], []
     for name, models in scenes:
         out = programs.work / f"scene-cells-{name}"
         run([programs.path("hlod-build"), "--quiet", *map(str, models), str(out)])
@@ -66,9 +68,11 @@ def main():
             cap = int(PART_IN_MEMORY * alone[kind, target]["scene"])
             ways = [replay(programs, out, paths[kind], target, way, cap=cap) for way in WAYS]
             capped.append([f"{name}: {kind}, {target} ms", f"{cap / 2**20:.0f}", *held(ways)])
+        if name == "city" and not arguments.quick:
+            policies = by_policy(programs, out, frames)
         if name in PICTURES and arguments.write:
             pictures.append(street(programs, out, name, paths["walk"]))
-    text = "\n\n".join([made_on, tables(made, drawn, elsewhere, capped, frames), *pictures]) + "\n"
+    text = "\n\n".join([made_on, tables(made, drawn, elsewhere, capped, policies, frames), *pictures]) + "\n"
     print(text)
     if arguments.write:
         write_between_markers(DOCS / "cells.md", "cells", text)
@@ -212,6 +216,32 @@ def held(ways):
     ]
 
 
+def by_policy(programs, out, frames):
+    """Rows of `hlod-bench policies` over the walk and the drive for which cells were made."""
+    result = programs.work / "cells-policies"
+    run([programs.path("hlod-bench"), "policies", str(out), "--with-cells", "--policy", ",".join(POLICIES)]
+        + ["--paths", ",".join(KINDS), "--seeds", "1", "--targets", str(TARGETS_MS[0]), "--frames", str(frames)]
+        + ["--warm-up-frames", str(SETTLE), "--reference-every", str(EVERY), "--out", str(result)])
+    with open(result / "policies.csv", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["policy"] != "oracle"]
+
+    def both(policy, name, form):
+        of = {row["path"]: float(row[name]) for row in rows if row["policy"] == policy}
+        return " / ".join(form(of[kind]) for kind in KINDS)
+
+    return [
+        [
+            policy,
+            both(policy, "flip_mean", "{:.4f}".format),
+            both(policy, "frame_ms_p95", "{:.1f}".format),
+            both(policy, "late_percent", "{:.1f}".format),
+            both(policy, "toggles_per_min", "{:.0f}".format),
+            both(policy, "peak_mb", "{:.0f}".format),
+        ]
+        for policy in dict.fromkeys(row["policy"] for row in rows)
+    ]
+
+
 def street(programs, out, name, path):
     """The first frame of a walk by the hierarchy alone, with cells, and of the leaves, as one picture."""
     target = PICTURES[name]
@@ -232,11 +262,12 @@ def street(programs, out, name, path):
     return f"![{caption}](cells/{name}.jpg)\n\n*{caption}.*"
 
 
-def tables(made, drawn, elsewhere, capped, frames):
+def tables(made, drawn, elsewhere, capped, policies, frames):
     head = ["cells", "number", "m to the box", "a minute", "faces each", "triangles a face", "KB a face"]
     head += ["% missing / wrong"]
     of_runs = ["run", "% of frames", "ms, p95", "thousand triangles", "% of those in the frustum"]
     of_any = ["run", "% of frames", "ms, p95", "FLIP"]
+    of_policies = ["policy", "FLIP", "ms, p95", "late, %", "toggles a minute", "peak, MB"]
     under_cap = ["run", "cap, MiB", *of_any[1:], "% of frames lack a node", "MiB", "MB read again"]
     of_runs += ["FLIP", "gaps, millionths", "MiB", "toggle / change of cell, FLIP"]
     return (
@@ -254,6 +285,8 @@ def tables(made, drawn, elsewhere, capped, frames):
         + f"\nUnder a cap of {100 * PART_IN_MEMORY:.0f} % of what all of the scene takes in memory; a frame that lacks a "
         "node would have drawn it in place of a coarser one:\n\n"
         + table(under_cap, capped)
+        + (f"\nOther policies with cells, by `hlod-bench policies --with-cells` in the city at {TARGETS_MS[0]} ms, *"
+           f"{' / '.join(KINDS)}*:\n\n{table(of_policies, policies)}" if policies else "")
     ).strip()
 
 

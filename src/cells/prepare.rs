@@ -230,3 +230,20 @@ fn viewpoints(options: &CellOptions, nearest_m: f64) -> Vec<DVec3> {
     let corners = CORNERS.map(|corner| DVec3::from(corner) * half);
     std::iter::once(DVec3::ZERO).chain(corners).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_moves_by_less_than_what_is_behind_goes_on_is_seen_from_the_middle_alone() {
+        let options = CellOptions::default();
+        let moves_px = |metres: f64| options.reach_m() * options.focal_px() / metres;
+        for (nearest_m, many) in [(100.0, 5), (290.0, 5), (295.0, 1), (480.0, 1)] {
+            assert_eq!(viewpoints(&options, nearest_m).len(), many, "{nearest_m} m");
+            assert_eq!(moves_px(nearest_m) <= 3.0, many == 1);
+        }
+        let middle = viewpoints(&options, 100.0).iter().sum::<DVec3>();
+        assert_eq!(middle, DVec3::ZERO, "corners around the middle");
+    }
+}
