@@ -27,9 +27,18 @@ const RUN: [&str; 8] = [
     "unthrottled",
 ];
 
+/// At the pace of the path: however busy a machine is, the loader has read everything that is wanted before
+/// the log begins.
+const LOADED: [&str; 8] =
+    ["--size", "320x180", "--target-ms", "2000", "--warm-up-frames", "60", "--pace", "recorded"];
+
 /// Runs; `None` where there is no adapter and none is required.
 fn wall(place: &Place, path: &str, options: &[&str]) -> Option<Assert> {
-    let done = place.bench(&[&["out", path, "-q"], &RUN[..], options].concat());
+    ran(place, &[&["out", path, "-q"], &RUN[..], options].concat())
+}
+
+fn ran(place: &Place, arguments: &[&str]) -> Option<Assert> {
+    let done = place.bench(arguments);
     if done.get_output().status.code() != Some(NO_ADAPTER) {
         return Some(done);
     }
@@ -141,13 +150,9 @@ fn a_run_goes_on_with_the_parent_of_a_node_that_is_damaged() {
         let root = scene.nodes[inner(&scene) as usize].parent.unwrap();
         let file = node_file(&place, inner(&scene));
         (damage.apply)(&file);
-        let Some(done) = wall(
-            &place,
-            "orbit.csv",
-            &["--out", "r", "--policy", "lakhia", "--set", "all_siblings=1"],
-        ) else {
-            return;
-        };
+        let policy = ["--out", "r", "--policy", "lakhia", "--set", "all_siblings=1"];
+        let run = [&["out", "orbit.csv", "-q"], &LOADED[..], &policy].concat();
+        let Some(done) = ran(&place, &run) else { return };
         let name = file.file_name().unwrap().to_str().unwrap().to_owned();
         done.code(INPUT).stderr(contains(&name).and(contains("went on without 1 file")));
         let summary = place.summary("r");
