@@ -20,7 +20,7 @@ FRAMES, SETTLE, EVERY = 300, 100, 15
 # Triangles of what is near in a view, by which cull boxes are chosen: the default.
 NEAR = [50_000]
 WAYS = ["off", "cells", "auto"]
-# Where eyes are in no cell.
+# Where eyes are in no cell, but for the beginning of a flight.
 ELSEWHERE = ["fly", "rise"]
 # Policies that are compared with and without cells.
 POLICIES = ["gain-over-price", "best-first", "lakhia"]
@@ -285,7 +285,7 @@ def tables(made, drawn, elsewhere, capped, policies, frames):
         "triangles. Gaps are pixels with background where the leaves have surface that no outline explains. Changes are "
         "means over frames in which levels toggled (`off`), and in which the cell changed (`cells`), on walks at 30 ms:\n\n"
         + table(of_runs, drawn)
-        + (f"\nWhere eyes are in no cell:\n\n{table(of_any, elsewhere)}" if elsewhere else "")
+        + (f"\nFlights, whose eyes are in no cell but at their beginning, and rises:\n\n{table(of_any, elsewhere)}" if elsewhere else "")
         + f"\nUnder a cap of {100 * PART_IN_MEMORY:.0f} % of what all of the scene takes in memory, or {ROOTS} times what its "
         "roots take where that is more; a frame that lacks a "
         "node would have drawn it in place of a coarser one:\n\n"

@@ -1,8 +1,8 @@
 //! Geometry written by hand.
 
-use glam::{DVec3, Vec3};
-
 use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
 
 use super::NodeOcclusion;
 use crate::format::{NodeMesh, Primitive, Surface};

@@ -83,6 +83,11 @@ impl Leap {
         Some(Leapt { refined: leapt.nodes, hidden })
     }
 
+    /// Wants nothing in memory any more: there is time for all that is to be seen without.
+    pub fn forget(&mut self) {
+        self.wanted.clear();
+    }
+
     /// What is wanted in memory for it, with ranks.
     pub fn wanted<'a>(
         &'a self,

@@ -353,7 +353,9 @@ impl Policy for GainOverPrice {
             self.front_into(out);
             self.relieve_whole(frame, out);
         }
-        if !is_done && self.leap.is_due(frame.dt_s) {
+        if is_done {
+            self.leap.forget();
+        } else if self.leap.is_due(frame.dt_s) {
             self.leap(frame, least, out);
         }
         out.lacking = self.lacking(frame, ms, least);
