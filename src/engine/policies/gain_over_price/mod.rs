@@ -216,7 +216,8 @@ impl GainOverPrice {
         }
     }
 
-    /// Refines while there is time, or what makes way; milliseconds that the frame then takes.
+    /// Refines while there is time, or what makes way; milliseconds that the frame then takes. Upgrades are
+    /// left over where there is none.
     fn refine(&mut self, frame: &FrameInput<'_>, mut ms: f64) -> f64 {
         while let Some(Ranked { rank, node }) = self.upgrades.pop() {
             let least = self.worst(frame).map_or(0.0, |worst| self.ranks[worst as usize]);
@@ -225,6 +226,7 @@ impl GainOverPrice {
             }
             let more_ms = ms + refining_ms(frame, node);
             let Some(freed_ms) = self.make_way(frame, rank, more_ms - frame.budget_ms) else {
+                self.upgrades.push(Ranked { rank, node });
                 break;
             };
             ms = more_ms - freed_ms;

@@ -310,3 +310,29 @@ fn what_hides_the_rest_is_refined_though_there_is_time_for_it_only_then() {
     frame.residents.set(1, false);
     assert_eq!(run(&frame, &mut hidden, 60).last().unwrap(), &[0, 3, 6]);
 }
+
+#[test]
+fn what_a_leap_lacks_is_asked_for_no_longer_than_frames_are_full() {
+    // 0 → 1 → 2, 3, which are not in memory.
+    let below = sketch([11.0, 0.0, 0.0], 1.0, (0..2).map(|_| root(10.0, 0.0, 0)).collect());
+    let children = vec![Sketch { error: 0.1, ..below }, root(10.0, 0.0, 0)];
+    let near = Sketch { error: 0.5, ..sketch([11.0, 0.0, 0.0], 1.0, children) };
+    let mut frame = TestFrame::new(tree(vec![near]));
+    frame.target_ms = 12.0;
+    frame.residents.set(2, false);
+    frame.residents.set(3, false);
+    let mut hidden = HiddenNodes::new(frame.tree.len(), 0.1);
+    let mut policy = policy(&[("ahead", 0.0)]);
+    let mut asks = |frame: &TestFrame| {
+        hidden.begin_frame(&frame.view, frame.dt_s);
+        let mut out = Selection::default();
+        policy.select(&FrameInput { hidden: Some(&hidden), ..frame.input() }, &mut out);
+        hidden.drawn(&frame.tree, &out.front, &frame.view);
+        out.requests.iter().any(|&(node, _)| node == 2)
+    };
+    assert!((0..60).any(|_| asks(&frame)), "there is no time for node 0's children before");
+    let mut pose = frame.view.pose;
+    pose.position.x = 1000.0;
+    frame.view = View::new(pose, frame.view.velocity, frame.view.size);
+    assert!(!asks(&frame), "nothing is in view");
+}
