@@ -24,4 +24,4 @@ pub use node_occlusion::NodeOcclusion;
 pub use occluders::Occluders;
 pub use seen_areas::SeenAreas;
 #[cfg(test)]
-pub(in crate::engine) use test_mesh::test_wall;
+pub(in crate::engine) use test_mesh::{seen_past, test_wall};

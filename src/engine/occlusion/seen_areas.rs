@@ -122,6 +122,12 @@ impl SeenAreas {
     /// Square metres across the line of sight in which a node was seen; `None` where it was out of the
     /// view that is known.
     pub fn of(&self, tree: &SceneTree, node: u32) -> Option<f64> {
+        Some(self.part(tree, node)? * across(tree, node, &self.known.as_ref()?.view))
+    }
+
+    /// The part of what is under a node's box in which the node was seen, above 0 and to 1; `None` as
+    /// in [`of`](Self::of).
+    pub fn part(&self, tree: &SceneTree, node: u32) -> Option<f64> {
         let Known { view, points } = self.known.as_ref()?;
         let [min, max] = tree.node(node).bbox;
         let rectangle = view.frustum.rectangle([min, max])?;
@@ -140,8 +146,7 @@ impl SeenAreas {
                 seen += u32::from(at.clamp(inside[0], inside[1]) == at);
             }
         }
-        let part = (f64::from(seen) + WEIGHT * USUAL) / (f64::from(looked) + WEIGHT);
-        Some(part * across(tree, node, view))
+        Some((f64::from(seen) + WEIGHT * USUAL) / (f64::from(looked) + WEIGHT))
     }
 
     /// The same where nothing is known, from a view.

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::NodeOcclusion;
+use super::{NodeOcclusion, Occluders, SeenAreas};
+use crate::camera::View;
 use crate::format::{NodeMesh, Primitive, Surface};
 use crate::mesh::{AlphaMode, UpAxis, Wrap};
 use crate::random::Random;
@@ -32,14 +33,28 @@ pub(super) fn mesh(triangles: &[[[f32; 3]; 3]]) -> NodeMesh {
     }
 }
 
+/// A square across x, about a point.
+fn square([x, y, z]: [f32; 3], width: f32) -> NodeMesh {
+    let [a, b, c, d] = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+        .map(|[along, up]| [x, y + along * width, z + up * width]);
+    mesh(&[[a, b, c], [a, c, d]])
+}
+
 /// A square of 6 m across x, so many metres away.
 pub(in crate::engine) fn test_wall(distance: f32) -> Arc<NodeOcclusion> {
-    let corner = |y: f32, z: f32| [distance, y, z];
-    let mesh = mesh(&[
-        [corner(-3.0, -3.0), corner(3.0, -3.0), corner(3.0, 3.0)],
-        [corner(-3.0, -3.0), corner(3.0, 3.0), corner(-3.0, 3.0)],
-    ]);
-    Arc::new(NodeOcclusion::new(&mesh, UpAxis::Z))
+    Arc::new(NodeOcclusion::new(&square([distance, 0.0, 0.0], 6.0), UpAxis::Z))
+}
+
+/// What is seen of nodes behind and in squares across x, each about a point and so wide.
+pub(in crate::engine) fn seen_past(view: &View, squares: &[([f32; 3], f32)]) -> SeenAreas {
+    let mut occluders = Occluders::default();
+    for &(middle, width) in squares {
+        let [min, max] = [-0.5, 0.5].map(|part| Vec3::from(middle) + part * width);
+        occluders.add([min, max].map(Vec3::as_dvec3), &square(middle, width));
+    }
+    let mut seen = SeenAreas::new(Arc::new(occluders), 0.1);
+    seen.look(view, 0.0);
+    seen
 }
 
 /// A wall of 12 by 8 m at x = 0 with bumps, of which some triangles are missing, and some others stand

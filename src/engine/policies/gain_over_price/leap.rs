@@ -13,6 +13,13 @@ use crate::engine::{FrameInput, FrontLoad};
 /// It is tried so often, seconds.
 const EVERY_S: f64 = 0.25;
 
+/// Where less than this part of the budget goes to what is not seen, none is tried, nor anything loaded for
+/// one. A tenth goes to it in flights, in streets a half and more.
+const LEAST_UNSEEN: f64 = 0.3;
+
+/// A node is not seen where it was in less than this part of what is under its box.
+const SEEN: f64 = 0.1;
+
 /// For so many times the budget nodes are refined to find out what they hide; one after the other.
 const STRETCHES: [f64; 4] = [1.2, 1.5, 2.0, 3.0];
 
@@ -57,6 +64,10 @@ impl Leap {
         gain: &mut Gain,
     ) -> Option<Leapt> {
         let hidden = frame.hidden?;
+        if unseen_ms(frame, front) < LEAST_UNSEEN * frame.budget_ms {
+            self.forget();
+            return None;
+        }
         let stretch_ms = STRETCHES[self.next % STRETCHES.len()] * frame.budget_ms;
         self.next += 1;
         let is_hidden = |node: u32| frame.is_hidden(node);
@@ -83,7 +94,7 @@ impl Leap {
         Some(Leapt { refined: leapt.nodes, hidden })
     }
 
-    /// Wants nothing in memory any more: there is time for all that is to be seen without.
+    /// Wants nothing in memory any more: there is time for all that is to be seen without, or nothing to gain.
     pub fn forget(&mut self) {
         self.wanted.clear();
     }
@@ -156,4 +167,13 @@ impl<'a> Refined<'a> {
 fn drawn_ms(frame: &FrameInput<'_>, front: &[u32], is_hidden: &dyn Fn(u32) -> bool) -> f64 {
     let drawn: Vec<u32> = front.iter().copied().filter(|&node| !is_hidden(node)).collect();
     frame.costs.priced_ms(&FrontLoad::default().of(frame.tree, &drawn, frame.view, 0))
+}
+
+/// Milliseconds of what is drawn of a front though, by the surfaces of the roots, it is not seen: what coarse
+/// surfaces do not hide for sure, and finer ones may.
+fn unseen_ms(frame: &FrameInput<'_>, front: &[u32]) -> f64 {
+    let is_seen = |node| {
+        frame.seen.is_some_and(|seen| seen.part(frame.tree, node).is_none_or(|part| part > SEEN))
+    };
+    drawn_ms(frame, front, &|node| frame.is_hidden(node) || is_seen(node))
 }

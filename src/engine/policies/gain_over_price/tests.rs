@@ -1,7 +1,7 @@
 use super::*;
 use crate::camera::{View, from_angles};
 use crate::engine::HiddenNodes;
-use crate::engine::occlusion::test_wall;
+use crate::engine::occlusion::{seen_past, test_wall};
 use crate::engine::test_frame::{TestFrame, passes_over_what_is_not_in_memory, root};
 use crate::mesh::UpAxis;
 use crate::random::Random;
@@ -335,4 +335,37 @@ fn what_a_leap_lacks_is_asked_for_no_longer_than_frames_are_full() {
     pose.position.x = 1000.0;
     frame.view = View::new(pose, frame.view.velocity, frame.view.size);
     assert!(!asks(&frame), "nothing is in view");
+}
+
+#[test]
+fn where_all_that_is_drawn_is_seen_nothing_is_loaded_for_a_leap() {
+    // 0 → 1 → 2, 3, which are not in memory, and 4; beside it, farther away, 5 → 6, 7 and 8 → 9, 10.
+    let below = sketch([11.0, 0.0, 0.0], 1.0, (0..2).map(|_| root(10.0, 0.0, 0)).collect());
+    let children = vec![Sketch { error: 0.1, ..below }, root(10.0, 0.0, 0)];
+    let near = Sketch { error: 0.5, ..sketch([11.0, 0.0, 0.0], 1.0, children) };
+    let beside = |y: f64| {
+        let at = [21.0, y, 0.0];
+        let children = (0..2).map(|_| sketch(at, 1.0, vec![])).collect();
+        Sketch { error: 0.01, ..sketch(at, 1.0, children) }
+    };
+    let mut frame = TestFrame::new(tree(vec![near, beside(4.0), beside(-4.0)]));
+    frame.target_ms = 32.0;
+    let squares = [[11.0, 0.0, 0.0], [21.0, 4.0, 0.0], [21.0, -4.0, 0.0]].map(|at| (at, 1.5));
+    let walled = [([10.5, 0.0, 0.0], 8.0), squares[1], squares[2]];
+    frame.residents.set(2, false);
+    frame.residents.set(3, false);
+    for (squares, asks) in [(squares, false), (walled, true)] {
+        let seen = seen_past(&frame.view, &squares);
+        let mut hidden = HiddenNodes::new(frame.tree.len(), 0.1);
+        let mut policy = policy(&[("ahead", 0.0)]);
+        let is_asked = (0..60).any(|_| {
+            hidden.begin_frame(&frame.view, frame.dt_s);
+            let mut out = Selection::default();
+            let input = FrameInput { hidden: Some(&hidden), seen: Some(&seen), ..frame.input() };
+            policy.select(&input, &mut out);
+            hidden.drawn(&frame.tree, &out.front, &frame.view);
+            out.requests.iter().any(|&(node, _)| node == 2)
+        });
+        assert_eq!(is_asked, asks, "{squares:?}");
+    }
 }
