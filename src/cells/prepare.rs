@@ -73,17 +73,9 @@ pub fn prepare(
     let dir = out.join(CELLS_DIR);
     std::fs::create_dir_all(&dir)
         .map_err(|error| Error::output(&dir, format!("cannot make the folder: {error}")))?;
-    for part in missing.chunks(CELLS_BETWEEN) {
-        let mut more = Vec::with_capacity(part.len());
-        for &place in part {
-            more.push(cell(out, &mut capture, &session, place, options, kind)?);
-            progress.done();
-        }
-        cells.add(more);
-        write_beside(&out.join(CELLS_FILE), &cells.to_bytes()?)?;
-    }
-    // Also where none was missing: what was damaged and is not asked for any more is gone from it.
-    write_beside(&out.join(CELLS_FILE), &cells.to_bytes()?)?;
+    add(out, &mut cells, &missing, progress, |place| {
+        cell(out, &mut capture, &session, place, options, kind)
+    })?;
     remove_others(&dir, &cells);
     Ok(Prepared {
         cells: cells.cells.len(),
@@ -93,6 +85,34 @@ pub fn prepare(
         bytes: cells.faces.iter().map(|face| face.file_bytes).sum(),
         cull_m: cull_m_of(&cells),
     })
+}
+
+/// Adds cells and writes the index, now and then and at the end; also where one cannot be made, since another
+/// run goes on from there.
+fn add(
+    out: &Path,
+    cells: &mut Cells,
+    places: &[[i64; 3]],
+    progress: &dyn Progress,
+    mut make: impl FnMut([i64; 3]) -> Result<(Cell, Vec<Face>)>,
+) -> Result<()> {
+    let mut write = |more: Vec<(Cell, Vec<Face>)>| {
+        cells.add(more);
+        write_beside(&out.join(CELLS_FILE), &cells.to_bytes()?)
+    };
+    for part in places.chunks(CELLS_BETWEEN) {
+        let mut more = Vec::with_capacity(part.len());
+        for &place in part {
+            match make(place) {
+                Ok(made) => more.push(made),
+                Err(error) => return write(more).and(Err(error)),
+            }
+            progress.done();
+        }
+        write(more)?;
+    }
+    // Also where none was missing: what was damaged and is not asked for any more is gone from it.
+    write(Vec::new())
 }
 
 /// The least and the most metres from a cell to the sides of its cull box.
@@ -233,7 +253,43 @@ fn viewpoints(options: &CellOptions, nearest_m: f64) -> Vec<DVec3> {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell as Counter;
+
     use super::*;
+
+    struct Count(Counter<usize>);
+
+    impl Progress for Count {
+        fn begin(&self, _: usize, _: usize) {}
+
+        fn done(&self) {
+            self.0.set(self.0.get() + 1);
+        }
+    }
+
+    #[test]
+    fn what_was_made_before_an_adapter_was_lost_stays() {
+        let out = tempfile::tempdir().unwrap();
+        let mut cells = Cells {
+            scene: [1; 32],
+            parameters: serde_json::json!({}),
+            size: 4.0,
+            texel: 0.004,
+            cells: Vec::new(),
+            faces: Vec::new(),
+        };
+        let places: Vec<[i64; 3]> = (0..40).map(|at| [at, 0, 0]).collect();
+        let progress = Count(Counter::new(0));
+        let failed = add(out.path(), &mut cells, &places, &progress, |place| match place {
+            [20, ..] => Err(Error::Graphics("lost".into())),
+            place => Ok((Cell { place, cull_box: [[-9.0; 3], [200.0; 3]], faces: 0..0 }, vec![])),
+        });
+        assert!(matches!(failed, Err(Error::Graphics(_))), "{failed:?}");
+        assert_eq!(progress.0.get(), 20);
+        let found = Cells::read(out.path()).unwrap().unwrap();
+        let found: Vec<[i64; 3]> = found.cells.iter().map(|cell| cell.place).collect();
+        assert_eq!(found, places[..20]);
+    }
 
     #[test]
     fn what_moves_by_less_than_what_is_behind_goes_on_is_seen_from_the_middle_alone() {

@@ -1,6 +1,6 @@
 //! The graphics device: opened, waited for, and asked what went wrong.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use wgpu::{Adapter, DeviceDescriptor, Features, MemoryHints, PollType, Queue, SubmissionIndex};
 
@@ -16,6 +16,8 @@ pub(super) struct Device {
     pub label: AdapterLabel,
     /// The first complaint that nobody was told of yet.
     complaint: Arc<Mutex<Option<String>>>,
+    /// How it was lost; nothing can be done with it from then on.
+    loss: Arc<OnceLock<String>>,
 }
 
 impl Device {
@@ -44,17 +46,17 @@ impl Device {
         }))?;
         let complaint = Arc::new(Mutex::new(None));
         let heard = Arc::clone(&complaint);
-        let complain = move |what: String| {
-            heard.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(what);
-        };
-        let lost = complain.clone();
         // Otherwise wgpu would end the process.
-        device.on_uncaptured_error(Arc::new(move |error| complain(error.to_string())));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            heard.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error.to_string());
+        }));
+        let loss = Arc::new(OnceLock::new());
+        let lost = Arc::clone(&loss);
         device.set_device_lost_callback(move |reason, what| {
-            lost(format!("the graphics device was lost ({reason:?}): {what}"));
+            lost.get_or_init(|| format!("the graphics device was lost ({reason:?}): {what}"));
         });
         let label = adapter::label(adapter);
-        Ok(Self { device, queue, label, complaint })
+        Ok(Self { device, queue, label, complaint, loss })
     }
 
     /// Whether it samples pictures of a format.
@@ -72,13 +74,19 @@ impl Device {
     pub fn wait(&self, submission: SubmissionIndex) -> Result<()> {
         let wait = PollType::Wait { submission_index: Some(submission), timeout: None };
         let waited = self.device.poll(wait);
+        if waited.is_err() {
+            // What is submitted to a device that is lost is left out without a word; of the loss it tells when
+            // it is polled.
+            drop(self.device.poll(PollType::Poll));
+        }
         self.check()?;
-        waited.map(|_| ()).map_err(|error| Error::Graphics(error.to_string()))
+        waited.map(|_| ()).map_err(|error| Error::Graphics(format!("{}: {error}", self.label)))
     }
 
-    /// Fails where something went wrong since it was last asked.
+    /// Fails where something went wrong since it was last asked, and always once it is lost.
     pub fn check(&self) -> Result<()> {
-        match self.complaint.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        let complaint = self.complaint.lock().unwrap_or_else(PoisonError::into_inner).take();
+        match self.loss.get().cloned().or(complaint) {
             Some(what) => Err(Error::Graphics(format!("{}: {what}", self.label))),
             None => Ok(()),
         }

@@ -454,3 +454,41 @@ fn instance_buffer(device: &Device, room: usize) -> Buffer {
 fn missing(what: &str, index: u32) -> Error {
     Error::Internal(format!("{what} {index} is to be drawn but was not uploaded"))
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+
+    use super::*;
+
+    #[test]
+    fn an_adapter_that_is_lost_is_named_and_ends_nothing() {
+        let options = RenderOptions { size: [64, 64], ..RenderOptions::default() };
+        let mut renderer = match Renderer::new(&options) {
+            Ok(renderer) => renderer,
+            Err(error) => {
+                let is_required = std::env::var("HLOD_REQUIRE_GPU").is_ok_and(|value| value == "1");
+                assert!(!is_required && matches!(error, Error::NoAdapter(_)), "{error}");
+                return println!("skipped: {error}");
+            }
+        };
+        let pose = Pose { position: DVec3::ZERO, rotation: DQuat::IDENTITY, fov_y_deg: 60.0 };
+        renderer.draw(&[], &pose, 0.1).unwrap();
+        renderer.device.device.destroy();
+        let label = renderer.device.label.to_string();
+        let picture = Picture::new(4, 4, vec![0; 64]).unwrap();
+        // And again.
+        for _ in 0..2 {
+            let failures = [
+                renderer.draw(&[], &pose, 0.1).err(),
+                renderer.snapshot().err(),
+                renderer.upload_shared(0, &picture).err(),
+            ];
+            for failure in failures {
+                let Some(Error::Graphics(what)) = failure else { panic!("{failure:?}") };
+                assert!(what.contains(&label) && what.contains("was lost"), "{what}");
+            }
+        }
+        renderer.remove_shared(0);
+    }
+}
