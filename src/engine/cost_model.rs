@@ -221,11 +221,13 @@ impl CostModel {
     /// choices are made by, since the same load is then the same from one frame to the next. By
     /// [`estimate`](Self::estimate), which follows each frame's noise a little, levels toggle two to four
     /// times as often.
+    #[inline]
     pub fn priced_ms(&self, load: &Load) -> f64 {
         dot(&self.sums(), &load.terms())
     }
 
     /// Milliseconds of that which a load adds to a frame that is drawn anyway.
+    #[inline]
     pub fn added_ms(&self, load: &Load) -> f64 {
         self.priced_ms(load) - self.sums()[0]
     }
