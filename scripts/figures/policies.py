@@ -88,9 +88,8 @@ def measure(arguments, programs, scenes, aside):
         program = [programs.path("hlod-bench"), "policies", *folders, "--quiet"]
         listed = ["--paths", ",".join(paths), "--targets", ",".join(map(str, targets))]
         listed += ["--frames", str(frames)]
-        if not arguments.kept:
-            run([*program, *listed, *options, "--out", str(results)])
-            say(f"done: {what}")
+        run([*program, *listed, *options, "--out", str(results)])
+        say(f"done: {what}")
         with open(results / "policies.csv", newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
         with open(results / "policies.json", encoding="utf-8") as file:
@@ -157,7 +156,6 @@ def parse():
     options = Options("policies", __doc__, "a small city, 90 frames, one seed")
     options.add_argument("--frames", type=int, default=450, help="frames of each path, a third of them for every toggle [450]")
     options.add_argument("--seeds", type=int, default=1, help="routes and noises [1]")
-    options.add_argument("--kept", action="store_true", help="tables of the last run's figures; only choosing is timed again")
     arguments = options.parse()
     if arguments.quick:
         arguments.frames, arguments.seeds = 90, 1

@@ -83,7 +83,7 @@ impl Device {
         waited.map(|_| ()).map_err(|error| Error::Graphics(format!("{}: {error}", self.label)))
     }
 
-    /// Fails where something went wrong since it was last asked, and always once it is lost.
+    /// Fails where something went wrong since it was last asked, and always once it is known to be lost.
     pub fn check(&self) -> Result<()> {
         let complaint = self.complaint.lock().unwrap_or_else(PoisonError::into_inner).take();
         match self.loss.get().cloned().or(complaint) {
