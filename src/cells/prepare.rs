@@ -105,6 +105,7 @@ fn add(
         for &place in part {
             match make(place) {
                 Ok(made) => more.push(made),
+                Err(error) if more.is_empty() => return Err(error),
                 Err(error) => return write(more).and(Err(error)),
             }
             progress.done();
