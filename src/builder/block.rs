@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use crate::Result;
+use crate::builder::block_setup::{BlockPlace, BlockSetup, Looks, Target};
 use crate::builder::blocks::block_plan::{BlockPlan, Division};
 use crate::builder::blocks::gather::{divide, gather, localise};
 use crate::builder::blocks::merge_adjacent::plan_of_parts;
@@ -16,26 +17,20 @@ use crate::builder::border::shared::{
     Bounds, bounds_of, is_of_shared, keep_shared, shared_positions,
 };
 use crate::builder::cut::split::Chunk;
-use crate::builder::emit::disk_sink::{DiskSink, NodeRecord, file_name};
-use crate::builder::hierarchy::{
-    BlockBuilder, Forest, HierarchyOptions, LeftOut, Resolutions, Tree,
-};
+use crate::builder::emit::disk_sink::{NodeRecord, file_name};
+use crate::builder::hierarchy::{Forest, HierarchyOptions, LeftOut, Resolutions, Tree};
 use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
-use crate::builder::simplify::aggregate::{BodyRules, Extrudable};
-use crate::builder::simplify::orient::reorientable;
+use crate::builder::simplify::aggregate::BodyRules;
 use crate::builder::stages::{Stage, Stages};
 use crate::builder::stitch::{Stitch, stitches};
 use crate::builder::threads::in_parallel;
-use crate::format::{BlockInfo, Encoding, OutputDir};
+use crate::format::{BlockInfo, OutputDir};
 use crate::lattice::Lattice;
 use crate::lattice::Quantization;
 use crate::mesh::{Material, Model, Part, PositionKey, UpAxis, Warnings, key};
 use crate::report::build_report::LeftOutNode;
-use crate::texture::{
-    BakeClasses, BlockTextures, Seams, SharedTextures, TextureCache, TextureOptions, TexturePlan,
-    TextureUse, texture_factors,
-};
+use crate::texture::{SharedTextures, TextureCache};
 
 /// A block whose nodes are written.
 #[derive(Debug)]
@@ -49,11 +44,7 @@ pub struct BuiltBlock {
 impl BuiltBlock {
     /// Visits all records, parents first.
     pub fn for_each<'a>(&'a self, visit: &mut impl FnMut(&'a NodeRecord)) {
-        fn down<'a>(tree: &'a Tree<NodeRecord>, visit: &mut impl FnMut(&'a NodeRecord)) {
-            visit(&tree.record);
-            tree.children.iter().for_each(|child| down(child, visit));
-        }
-        self.trees.iter().for_each(|tree| down(tree, visit));
+        self.trees.iter().for_each(|tree| tree.for_each(visit));
     }
 }
 
@@ -115,13 +106,6 @@ impl DraftSource {
     }
 }
 
-/// Whether charts of their own fit into the atlases of nodes: each takes cells of up to 8 by 8
-/// texels, and a node has hardly more charts than triangles.
-fn has_room_for_charts(options: &BuildOptions) -> bool {
-    let cells = (u64::from(options.max_atlas) / 8).pow(2);
-    cells >= 4 * u64::from(options.hierarchy.desired_tris).max(1000)
-}
-
 /// Builds all blocks of a model and writes their nodes.
 pub fn build_input(
     mut model: Model,
@@ -143,19 +127,10 @@ pub fn build_input(
     }
     merge_untextured(&mut model);
     let HierarchyOptions { desired_tris, constants, .. } = &options.hierarchy;
-    let texture_plan = TexturePlan::new(&model);
-    let is_cut_up = |material: u32| {
-        let texture = texture_plan.texture_of(material);
-        texture.map(|texture| texture_plan.texture_use(texture)) == Some(TextureUse::Atlas)
-            && options.hierarchy.seams != Seams::Keep
-    };
-    let classes = BakeClasses::new(&model.materials, is_cut_up);
-    let is_plain = |&material: &u32| texture_plan.texture_of(material).is_none();
-    let plain = |part: &Part| Some(part.material).filter(is_plain);
-    let kind = |part: &Part| classes.of(part.material).or_else(|| plain(part));
-    let kinds = model.parts.iter().map(kind).collect();
+    let looks = Looks::new(&model, options.hierarchy.seams);
+    let kinds = looks.kinds(&model.parts);
     let stitches = stages.time(Stage::Gather, || stitches(&model.parts, kinds, &constants.stitch));
-    let extrudable = Extrudable::new(model.materials.len(), |m| !is_plain(&m), &classes);
+    let Looks { textures: texture_plan, extrudable, .. } = looks;
     // Where textures are many and small enough to keep a root from being what it should, they are
     // baked anew.
     let rules =
@@ -191,13 +166,9 @@ pub fn build_input(
         &texture_plan,
         drafts.iter().map(|draft| draft.materials.iter().copied()),
     );
-    let reorientable: Vec<bool> = model.materials.iter().map(reorientable).collect();
     let prefix = file_prefix(&model.source);
-    let mut hierarchy = options.hierarchy.clone();
-    if quantization.is_some() {
-        // Vertices are beside their planes by steps that show.
-        hierarchy.tolerance.sliver_steps = hierarchy.tolerance.sliver_steps.min(1.0);
-    }
+    let target = Target { options, out, shared, stages, progress };
+    let setup = BlockSetup::new(target, up, &cache, &extrudable);
     let built = in_parallel(drafts, |number, draft| {
         let (lattice, coarse) =
             if draft.far { lattice_of(&mut [&draft].into_iter()) } else { (common, None) };
@@ -229,44 +200,10 @@ pub fn build_input(
             return Ok((None, warnings, 0));
         }
         let resolutions = Resolutions::new(chunk.mesh.triangles.len(), &options.hierarchy);
-        let factors = resolutions.factors();
-        let texture_options = TextureOptions {
-            jpeg_quality: options.jpeg_quality,
-            max_atlas: options.max_atlas,
-            seams: options.hierarchy.seams,
-            root_triangles: (chunk.mesh.triangles.len() as f64 / factors[0]) as usize,
-        };
-        let textures = stages.time(Stage::Pictures, || {
-            let level_factor = f64::from(options.hierarchy.level_factor);
-            let texel_factors = texture_factors(factors, level_factor);
-            BlockTextures::prepare(&cache, shared, &chunk.mesh, &texel_factors, texture_options)
-        });
-        let sink = DiskSink {
-            textures: &textures,
-            out,
-            prefix: format!("{prefix}-{number:04}"),
-            origin,
-            up,
-            encoding: Encoding {
-                step: quantization.map(|quantization| quantization.step),
-                compress: options.compress,
-            },
-            textured_weight: options.textured_weight,
-            stages,
-            progress,
-        };
-        let builder = BlockBuilder {
-            options: &hierarchy,
-            resolutions,
-            bake: textures.bake_plan().filter(|_| has_room_for_charts(options)),
-            lattice,
-            quantization,
-            up,
-            reorientable: &reorientable,
-            extrudable: &extrudable,
-            sink: &sink,
-            stages,
-        };
+        let place = BlockPlace { prefix: format!("{prefix}-{number:04}"), origin, lattice };
+        let textures = setup.textures(&chunk.mesh, &resolutions);
+        let sink = setup.sink(&textures, &place);
+        let builder = setup.builder(&sink, resolutions, lattice);
         let Forest { trees, left_out } = builder.build(chunk)?;
         let left_out = left_out.into_iter().map(|LeftOut { child_path, triangles, kept }| {
             LeftOutNode { file: file_name(&sink.prefix, &child_path), triangles, kept }

@@ -1,6 +1,7 @@
 //! From imported models to nodes on disk.
 //!
 //! - [`pipeline`]: the whole build; [`block`]: one input to the trees of its blocks
+//! - [`districts`]: nodes above the blocks, made from these nodes' files
 //! - [`blocks`]: what a block is: groups merged, divided and gathered
 //! - [`stitch`]: borders of the source that touch without sharing vertices
 //! - [`hierarchy`]: the tree of one block
@@ -12,10 +13,12 @@
 //! - [`constants`]: what was chosen by measuring
 
 pub mod block;
+pub mod block_setup;
 pub mod blocks;
 pub mod border;
 pub mod constants;
 pub mod cut;
+pub mod districts;
 pub mod emit;
 pub mod error;
 pub mod hierarchy;

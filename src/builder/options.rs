@@ -29,6 +29,8 @@ pub struct BuildOptions {
     pub compress: bool,
     /// Weight of textured triangles in the cost (`c_textured`), 0–1.
     pub textured_weight: f64,
+    /// Whether there are nodes above the blocks ([`crate::builder::districts`]).
+    pub districts: bool,
     /// Build even where nothing has changed.
     pub force: bool,
 }
@@ -45,6 +47,7 @@ impl Default for BuildOptions {
             quantize: None,
             compress: false,
             textured_weight: crate::format::attributes::TEXTURED_WEIGHT,
+            districts: false,
             force: false,
         }
     }
@@ -99,6 +102,9 @@ impl BuildOptions {
         }
         if self.compress {
             parameters["compress"] = "meshopt".into();
+        }
+        if self.districts {
+            parameters["districts"] = "on".into();
         }
         if self.placement != Placement::Local {
             parameters[PLACEMENT] = serde_json::json!(self.placement);

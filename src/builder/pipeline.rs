@@ -6,8 +6,11 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::builder::block::{BuiltBlock, build_input};
+use crate::builder::districts::{Above, Districts, build_districts};
 use crate::builder::emit::disk_sink::{NodeRecord, check_unique};
-use crate::builder::emit::forest::{append_nodes, make_errors_monotone};
+use crate::builder::emit::forest::{append_nodes, make_errors_monotone, set_block};
+use crate::builder::emit::shared_textures::write_textures;
+use crate::builder::hierarchy::Tree;
 use crate::builder::inputs::{describe, fingerprint, text_of, unchanged};
 use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
@@ -17,8 +20,8 @@ use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::{Stage, Stages};
 use crate::cpu_time::CpuTime;
 use crate::format::{
-    BlockInfo, Node, OutputDir, REPORT_FILE, SCENE_FILE, Scene, SharedTexture, TEXTURES_DIR,
-    check_apart, fits_in_steps,
+    BlockInfo, Node, OutputDir, REPORT_FILE, SCENE_FILE, Scene, SharedTexture, check_apart,
+    fits_in_steps,
 };
 use crate::lattice::Quantization;
 use crate::mesh::{Model, UpAxis, Warnings};
@@ -211,11 +214,22 @@ impl Run<'_> {
         let source_texels =
             reports.iter().map(|input| input.texels).sum::<u64>() + self.shared.source_texels();
         let mut warnings = warnings(&reports, earlier, self.globe.as_ref());
-        let shared_textures = write_textures(self.shared, reused_textures, self.output)?;
-        let over_budget = over_budget(&blocks, &mut warnings);
-        let baked = baked(&blocks);
+        let mut shared_textures = write_textures(self.shared, reused_textures, self.output)?;
         let up = agreed_up(&reports, &mut warnings);
-        let scene = scene_of(blocks, shared_textures, parameters.clone(), up, &reports)?;
+        let (infos, trees) = numbered(blocks);
+        let Districts { trees, reports: districts, warnings: imperfect } =
+            match self.options.districts {
+                true => {
+                    let Self { options, output, stages, progress, .. } = self;
+                    let above = Above { options, out: output, stages, progress, earlier, up };
+                    build_districts(trees, &mut shared_textures, &above)?
+                }
+                false => Districts { trees, ..Districts::default() },
+            };
+        warnings.extend(imperfect);
+        let over_budget = over_budget(&trees, &mut warnings);
+        let baked = baked(&trees);
+        let scene = scene_of(infos, trees, shared_textures, parameters.clone(), up, &reports)?;
         let quantization = self.options.quantization();
         if let (Some(quantization), Some(bounds)) = (quantization, scene.bounds()) {
             quantization.check_extent(bounds)?;
@@ -246,32 +260,13 @@ impl Run<'_> {
             quantized: quantization.map(|quantization| quantized(&scene, quantization)),
             over_budget,
             baked,
+            districts,
             warnings: Count::of_warnings(&warnings),
         };
         self.output.write(SCENE_FILE, &scene.to_bytes()?)?;
         self.output.write(REPORT_FILE, report.to_json()?.as_bytes())?;
         Ok(report)
     }
-}
-
-/// Writes new shared textures beside those of earlier results: all of them, by name.
-fn write_textures(
-    shared: SharedTextures,
-    mut textures: BTreeMap<String, SharedTexture>,
-    output: &OutputDir,
-) -> Result<BTreeMap<String, SharedTexture>> {
-    for file in shared.into_files() {
-        let texture = SharedTexture {
-            file_name: file.name.to_string(),
-            width: file.width,
-            height: file.height,
-            bytes: file.bytes.len() as u64,
-        };
-        if textures.insert(file.name.to_string(), texture).is_none() {
-            output.write(format!("{TEXTURES_DIR}/{}", file.name), &file.bytes)?;
-        }
-    }
-    Ok(textures)
 }
 
 fn write_tilesets(scene: &Scene, output: &OutputDir) -> Result<Vec<FileReport>> {
@@ -369,10 +364,10 @@ fn most_frequent(counts: impl IntoIterator<Item = Count>) -> Vec<Count> {
 }
 
 /// The nodes that have more triangles than they may, by id.
-fn over_budget(blocks: &[BuiltBlock], warnings: &mut Warnings) -> Vec<OverBudget> {
+fn over_budget(trees: &[Tree<NodeRecord>], warnings: &mut Warnings) -> Vec<OverBudget> {
     let mut over_budget = Vec::new();
-    for block in blocks {
-        block.for_each(&mut |record: &NodeRecord| {
+    for tree in trees {
+        tree.for_each(&mut |record: &NodeRecord| {
             over_budget.extend(record.reason.clone().map(|reason| OverBudget {
                 id: record.id,
                 file: record.file.clone(),
@@ -395,10 +390,10 @@ fn over_budget(blocks: &[BuiltBlock], warnings: &mut Warnings) -> Vec<OverBudget
 }
 
 /// The nodes with textures of their own, by id.
-fn baked(blocks: &[BuiltBlock]) -> Vec<Baked> {
+fn baked(trees: &[Tree<NodeRecord>]) -> Vec<Baked> {
     let mut baked = Vec::new();
-    for block in blocks {
-        block.for_each(&mut |record: &NodeRecord| {
+    for tree in trees {
+        tree.for_each(&mut |record: &NodeRecord| {
             let entry = |reason| Baked { id: record.id, file: record.file.clone(), reason };
             baked.extend(record.baked.map(entry));
         });
@@ -407,9 +402,25 @@ fn baked(blocks: &[BuiltBlock]) -> Vec<Baked> {
     baked
 }
 
-/// Joins the blocks' trees to a scene.
+/// The trees of blocks, which know the numbers of their blocks, and what these are.
+fn numbered(blocks: Vec<BuiltBlock>) -> (Vec<BlockInfo>, Vec<Tree<NodeRecord>>) {
+    let mut infos = Vec::with_capacity(blocks.len());
+    let mut all = Vec::with_capacity(blocks.len());
+    for (number, BuiltBlock { info, mut trees }) in (0u32..).zip(blocks) {
+        for tree in &mut trees {
+            make_errors_monotone(tree);
+            set_block(tree, number);
+        }
+        infos.push(info);
+        all.extend(trees);
+    }
+    (infos, all)
+}
+
+/// Joins trees to a scene.
 fn scene_of(
-    blocks: Vec<BuiltBlock>,
+    blocks: Vec<BlockInfo>,
+    trees: Vec<Tree<NodeRecord>>,
     shared_textures: BTreeMap<String, SharedTexture>,
     parameters: serde_json::Value,
     up: UpAxis,
@@ -417,13 +428,9 @@ fn scene_of(
 ) -> Result<Scene> {
     let numbers: BTreeMap<String, u32> = shared_textures.keys().cloned().zip(0u32..).collect();
     let mut nodes = Vec::new();
-    let mut infos: Vec<BlockInfo> = Vec::with_capacity(blocks.len());
-    for BuiltBlock { info, trees } in blocks {
-        for mut tree in trees {
-            make_errors_monotone(&mut tree);
-            append_nodes(&mut nodes, tree, infos.len() as u32, &numbers);
-        }
-        infos.push(info);
+    for mut tree in trees {
+        make_errors_monotone(&mut tree);
+        append_nodes(&mut nodes, tree, &numbers);
     }
     if nodes.is_empty() {
         return Err(Error::Internal("a build without nodes".into()));
@@ -434,7 +441,7 @@ fn scene_of(
         fingerprint: fingerprint(&parameters, reports),
         parameters,
         up,
-        blocks: infos,
+        blocks,
         shared_textures: shared_textures.into_values().collect(),
         nodes,
     })

@@ -13,7 +13,7 @@ use crate::builder::options::same_nodes;
 use crate::format::attributes::Attributes;
 use crate::format::{NODES_DIR, OutputDir, REPORT_FILE, Scene, SharedTexture, TEXTURES_DIR};
 use crate::mesh::Warnings;
-use crate::report::build_report::{BuildReport, FileReport, InputReport};
+use crate::report::build_report::{BuildReport, DistrictReport, FileReport, InputReport};
 
 /// A result whose nodes were made by this version with the same parameters, and are whole.
 pub struct Earlier {
@@ -74,32 +74,66 @@ impl Earlier {
     /// Links the files of an input's blocks into the new output.
     pub fn take_over(&self, input: &InputReport, output: &OutputDir) -> Result<Taken> {
         let mut taken = Taken { blocks: Vec::new(), shared_textures: BTreeMap::new() };
-        // A block's roots, of which there may be several, follow one another.
-        let mut last = None;
-        for root in self.scene.roots() {
+        // A block may have several roots, which may be in different districts.
+        let mut blocks: BTreeMap<u32, BuiltBlock> = BTreeMap::new();
+        for root in self.scene.block_roots() {
             let Some(block) = self.scene.nodes[root as usize].block else { continue };
             let info = &self.scene.blocks[block as usize];
             if info.input != input.path {
                 continue;
             }
             let tree = self.tree(root, output, &mut taken)?;
-            match taken.blocks.last_mut() {
-                Some(built) if last == Some(block) => built.trees.push(tree),
-                _ => taken.blocks.push(BuiltBlock { info: info.clone(), trees: vec![tree] }),
-            }
-            last = Some(block);
+            let built = blocks.entry(block);
+            let new = || BuiltBlock { info: info.clone(), trees: Vec::new() };
+            built.or_insert_with(new).trees.push(tree);
         }
-        for name in taken.shared_textures.keys() {
-            // Several inputs may share a picture.
+        taken.blocks = blocks.into_values().collect();
+        self.link_textures(taken.shared_textures.keys(), output)?;
+        Ok(taken)
+    }
+
+    /// Links shared textures into the new output that are not there yet: several nodes may have one.
+    pub fn link_textures<'a>(
+        &self,
+        names: impl Iterator<Item = &'a String>,
+        output: &OutputDir,
+    ) -> Result<()> {
+        for name in names {
             let relative = format!("{TEXTURES_DIR}/{name}");
             if !output.path().join(&relative).exists() {
                 output.reuse(&self.dir, relative)?;
             }
         }
-        Ok(taken)
+        Ok(())
+    }
+
+    /// Links the file of a district into the new output, where it is made of what it was made of then.
+    pub fn take_over_district(
+        &self,
+        file: &str,
+        made_of: &str,
+        output: &OutputDir,
+    ) -> Result<Option<(NodeRecord, BTreeMap<String, SharedTexture>)>> {
+        let is_same = |known: &&DistrictReport| known.file == file && known.made_of == made_of;
+        let known = self.report.districts.iter().any(|known| is_same(&known));
+        let node = self.scene.nodes.iter().position(|node| node.file == file);
+        let Some(index) = node.filter(|_| known) else { return Ok(None) };
+        let mut taken = Taken { blocks: Vec::new(), shared_textures: BTreeMap::new() };
+        let record = self.record(index as u32, output, &mut taken)?;
+        Ok(Some((record, taken.shared_textures)))
     }
 
     fn tree(&self, index: u32, output: &OutputDir, taken: &mut Taken) -> Result<Tree<NodeRecord>> {
+        let children = self
+            .scene
+            .children(index)
+            .map(|child| self.tree(child, output, taken))
+            .collect::<Result<Vec<_>>>()?;
+        Ok(Tree { record: self.record(index, output, taken)?, children })
+    }
+
+    /// A node, its file linked into the new output.
+    fn record(&self, index: u32, output: &OutputDir, taken: &mut Taken) -> Result<NodeRecord> {
         let node = &self.scene.nodes[index as usize];
         output.reuse(&self.dir, format!("{NODES_DIR}/{}", node.file))?;
         let mut shared = Vec::new();
@@ -111,44 +145,37 @@ impl Earlier {
             ));
             taken.shared_textures.insert(texture.file_name.clone(), texture.clone());
         }
-        let children = self
-            .scene
-            .children(index)
-            .map(|child| self.tree(child, output, taken))
-            .collect::<Result<Vec<_>>>()?;
         let over = self.report.over_budget.iter().find(|over| over.id == node.id);
         // In order of id.
         let baked = self.report.baked.binary_search_by_key(&node.id, |baked| baked.id);
         let baked = baked.ok().map(|place| &self.report.baked[place]);
-        Ok(Tree {
-            record: NodeRecord {
-                id: node.id,
-                file: node.file.clone(),
-                file_bytes: node.file_bytes,
-                file_crc: node.file_crc,
-                origin: node.origin,
-                attributes: Attributes {
-                    triangles: node.triangles,
-                    textured_triangles: node.textured_triangles,
-                    vertices: node.vertices,
-                    bbox_min: node.bbox_min,
-                    bbox_max: node.bbox_max,
-                    cost: node.cost,
-                    static_benefit: node.static_benefit,
-                    average_normal: node.average_normal.map(f64::from),
-                },
-                geometric_error: node.geometric_error,
-                mean_error: node.mean_error,
-                p95_error: node.p95_error,
-                pictures: node.pictures.clone(),
-                shared,
-                budget: over.map_or(0, |over| over.budget as usize),
-                step: None,
-                baked: baked.map(|baked| baked.reason),
-                reason: over.map(|over| over.reason.clone()),
-                warnings: Warnings::default(),
+        Ok(NodeRecord {
+            id: node.id,
+            file: node.file.clone(),
+            file_bytes: node.file_bytes,
+            file_crc: node.file_crc,
+            origin: node.origin,
+            attributes: Attributes {
+                triangles: node.triangles,
+                textured_triangles: node.textured_triangles,
+                vertices: node.vertices,
+                bbox_min: node.bbox_min,
+                bbox_max: node.bbox_max,
+                cost: node.cost,
+                static_benefit: node.static_benefit,
+                average_normal: node.average_normal.map(f64::from),
             },
-            children,
+            geometric_error: node.geometric_error,
+            mean_error: node.mean_error,
+            p95_error: node.p95_error,
+            pictures: node.pictures.clone(),
+            shared,
+            budget: over.map_or(0, |over| over.budget as usize),
+            step: None,
+            baked: baked.map(|baked| baked.reason),
+            reason: over.map(|over| over.reason.clone()),
+            block: None,
+            warnings: Warnings::default(),
         })
     }
 }

@@ -115,6 +115,15 @@ impl Scene {
         self.nodes.iter().zip(0..).filter(|(node, _)| node.parent.is_none()).map(|(_, index)| index)
     }
 
+    /// Indices of the coarsest nodes of blocks, in order: of those with none above, or a district.
+    pub fn block_roots(&self) -> impl Iterator<Item = u32> {
+        let is_root = |node: &Node| {
+            let above = node.parent.and_then(|parent| self.nodes.get(parent as usize)?.block);
+            node.block.is_some() && above.is_none()
+        };
+        (0u32..).zip(&self.nodes).filter(move |(_, node)| is_root(node)).map(|(index, _)| index)
+    }
+
     /// Indices of the children of a node, from the first to the last.
     pub fn children(&self, node: u32) -> Children<'_> {
         let next = self.nodes.get(node as usize).and_then(|node| node.first_child);

@@ -49,8 +49,21 @@ pub struct BuildReport {
     /// Nodes with textures of their own instead of the source's charts, in order of id.
     #[serde(default)]
     pub baked: Vec<Baked>,
+    /// Nodes above the blocks, in order of their files.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub districts: Vec<DistrictReport>,
     /// What was imperfect and how often, in the order in which it was met.
     pub warnings: Vec<Count>,
+}
+
+/// A node above the blocks.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DistrictReport {
+    /// Its file.
+    pub file: String,
+    /// BLAKE3 of all that it is made of, in hexadecimal: its members' files and their borders with
+    /// other districts.
+    pub made_of: String,
 }
 
 /// An input of the command line. Whoever takes over its nodes takes over all of this with them.

@@ -13,7 +13,8 @@ use crate::lattice::Quantization;
 /// A quantised build's step is among the parameters. Otherwise, or where blocks are too large for
 /// that, it is not stored. It follows from the largest extent of a block and the largest
 /// coordinate of an input, as [`Lattice::for_extent`] says; a block of strays has its own. Where
-/// an extent is a power of two to a millionth, the result may be twice the real step.
+/// an extent is a power of two to a millionth, the result may be twice the real step. Districts of one
+/// level have one lattice; all are taken to have that of the largest.
 pub(super) fn steps(scene: &Scene) -> Vec<f64> {
     let quantization = Quantization::of(&scene.parameters);
     fine_lattices(scene).into_iter().map(|fine| fine.or_coarser(quantization).step).collect()
@@ -40,8 +41,13 @@ fn fine_lattices(scene: &Scene) -> Vec<Lattice> {
     };
     let of_nodes: Vec<Block> = (0..scene.nodes.len() as u32).map(block_of).collect();
     let mut boxes: BTreeMap<Block, [[f64; 3]; 2]> = BTreeMap::new();
+    let mut members = Vec::new();
     for (node, &block) in scene.nodes.iter().zip(&of_nodes) {
-        // Coarse nodes may reach beyond the source; leaves do not.
+        // Coarse nodes may reach beyond the source; leaves do not. Districts are made of coarse ones.
+        let is_member = node.parent.is_some_and(|at| scene.nodes[at as usize].block.is_none());
+        if is_member {
+            members.push(node);
+        }
         if node.first_child.is_some() {
             continue;
         }
@@ -63,6 +69,18 @@ fn fine_lattices(scene: &Scene) -> Vec<Lattice> {
         for axis in 0..3 {
             *extent = extent.max(high[axis] - low[axis]);
             *magnitude = magnitude.max(low[axis].abs()).max(high[axis].abs());
+        }
+    }
+    let districts = groups.entry(("", None)).or_default();
+    let mut of_district: BTreeMap<Option<u32>, [[f64; 3]; 2]> = BTreeMap::new();
+    for member in members {
+        let [low, high] =
+            of_district.entry(member.parent).or_insert([member.bbox_min, member.bbox_max]);
+        for axis in 0..3 {
+            low[axis] = low[axis].min(member.bbox_min[axis]);
+            high[axis] = high[axis].max(member.bbox_max[axis]);
+            districts[0] = districts[0].max(high[axis] - low[axis]);
+            districts[1] = districts[1].max(low[axis].abs()).max(high[axis].abs());
         }
     }
     of_nodes

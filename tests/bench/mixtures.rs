@@ -5,6 +5,8 @@ use std::path::Path;
 
 use glam::DVec3;
 use hlod::bench::{Accuracy, FrameInspector, FrameSample, Reference, Session, SilhouetteTolerance};
+use hlod::builder::BuildOptions;
+use hlod::builder::blocks::plan::BlockMode;
 use hlod::camera::{Ground, PathKind, Pose, View, from_angles, make_path};
 use hlod::city::{CityOptions, TextureSize};
 use hlod::engine::FarShown;
@@ -24,8 +26,8 @@ const SIZE: [u32; 2] = [640, 360];
 /// as that have a cornice that a root lowers by 30.)
 const MOST_ERROR_PX: f64 = 20.0;
 
-/// Closed blocks of four levels.
-fn closed_city(folder: &Path) -> Session {
+/// Closed blocks, built so.
+fn closed_city(folder: &Path, build: &BuildOptions) -> Session {
     let options = CityOptions {
         blocks: 4,
         triangles: 40_000,
@@ -35,7 +37,7 @@ fn closed_city(folder: &Path) -> Session {
         ..CityOptions::default()
     };
     let out = folder.join("out");
-    build_with(&[write_city(folder, &options)], &out, &build_options(250));
+    build_with(&[write_city(folder, &options)], &out, build);
     Session::open(&out).unwrap()
 }
 
@@ -93,14 +95,18 @@ fn close_ups(tree: &SceneTree, count: usize) -> Vec<Pose> {
 }
 
 /// The nodes at which `stop` says so, by their place: the numbers of the children on the way to
-/// them, the root's first.
-fn front(tree: &SceneTree, mut stop: impl FnMut(&[u32]) -> bool) -> Vec<u32> {
+/// them, the root's first; but where `may_stop` says no, what is below them.
+fn front(
+    tree: &SceneTree,
+    may_stop: &impl Fn(u32) -> bool,
+    mut stop: impl FnMut(&[u32]) -> bool,
+) -> Vec<u32> {
     let mut front = Vec::new();
     let mut open: Vec<(u32, Vec<u32>)> =
         tree.roots().iter().zip(0..).map(|(&root, number)| (root, vec![number])).collect();
     while let Some((node, place)) = open.pop() {
         let children = tree.children(node);
-        if children.is_empty() || stop(&place) {
+        if children.is_empty() || stop(&place) && may_stop(node) {
             front.push(node);
         } else {
             let below = children.iter().zip(0..);
@@ -111,20 +117,23 @@ fn front(tree: &SceneTree, mut stop: impl FnMut(&[u32]) -> bool) -> Vec<u32> {
 }
 
 /// Fronts with neighbours as different as can be, random ones, and one level alone.
-fn fronts(tree: &SceneTree) -> Vec<(String, Vec<u32>)> {
-    let mut fronts = vec![("the roots".to_owned(), front(tree, |_| true))];
+fn fronts(tree: &SceneTree, may_stop: &impl Fn(u32) -> bool) -> Vec<(String, Vec<u32>)> {
+    let mut fronts = vec![("the roots".to_owned(), front(tree, may_stop, |_| true))];
     for parity in 0..2 {
         // The coarsest that can stand beside leaves, within trees and from tree to tree.
         let beside_leaves = |place: &[u32]| place.len() > 1 && place[1] % 2 == parity;
-        fronts.push((format!("level 1 beside leaves {parity}"), front(tree, beside_leaves)));
+        fronts.push((
+            format!("level 1 beside leaves {parity}"),
+            front(tree, may_stop, beside_leaves),
+        ));
         let roots = |place: &[u32]| place[0] % 2 == parity;
-        fronts.push((format!("roots beside leaves {parity}"), front(tree, roots)));
+        fronts.push((format!("roots beside leaves {parity}"), front(tree, may_stop, roots)));
         let checkerboard = |place: &[u32]| place.iter().sum::<u32>() % 2 == parity;
-        fronts.push((format!("checkerboard {parity}"), front(tree, checkerboard)));
+        fronts.push((format!("checkerboard {parity}"), front(tree, may_stop, checkerboard)));
     }
     for (share, seed) in [(0.2, 1), (0.4, 2), (0.6, 3)] {
         let mut random = Random::new(seed, 0);
-        fronts.push((format!("random {share}"), front(tree, |_| random.unit() < share)));
+        fronts.push((format!("random {share}"), front(tree, may_stop, |_| random.unit() < share)));
     }
     fronts
 }
@@ -147,15 +156,51 @@ fn inspect(reference: &mut Reference, pose: &Pose, front: &[u32]) -> Accuracy {
 #[test]
 fn closed_cities_show_no_background_through_any_mixture_of_levels() {
     let folder = tempfile::tempdir().unwrap();
-    let session = closed_city(folder.path());
-    let Some(mut reference) = reference(&session) else { return };
+    // Blocks of four levels.
+    let session = closed_city(folder.path(), &build_options(250));
+    no_background_shows_through(&session, folder.path(), 0.0, |_, _| true);
+}
+
+/// Of squares that planes cut out of the city, and two levels of districts above them.
+#[test]
+fn districts_show_no_background_beside_each_other_or_beside_any_level_below_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let blocks = BlockMode::Grid(10.0);
+    let options = BuildOptions { blocks, districts: true, ..build_options(250) };
+    let session = closed_city(folder.path(), &options);
+    assert!(session.scene().blocks.len() > 60, "{} blocks", session.scene().blocks.len());
+    let tops = session.tree().roots().len();
+    assert!(tops < 8 && session.scene().level_count() >= 4, "{tops}");
+    // A district is off by metres, which from a street is as far as to the other side of it.
+    let errors = |pose: &Pose, node: u32| {
+        let [low, high] = session.tree().node(node).bbox;
+        let away = pose.position.distance(pose.position.clamp(low, high));
+        let focal_px = f64::from(SIZE[1]) / 2.0 / (pose.fov_y_deg / 2.0).to_radians().tan();
+        session.scene().nodes[node as usize].geometric_error * focal_px / away
+    };
+    // Where one member of a district closed at a plane and the other did not, the skirt that hid that
+    // is gone with the border: a slit of some pixels in one view of a hundred.
+    no_background_shows_through(&session, folder.path(), 1e-5, |pose, node| {
+        errors(pose, node) <= MOST_ERROR_PX
+    });
+}
+
+/// Nodes are drawn in place of those below them where `may_stop` says so; no more than a share of `most` of
+/// the surface's pixels shows background within outlines.
+fn no_background_shows_through(
+    session: &Session,
+    folder: &Path,
+    most: f64,
+    may_stop: impl Fn(&Pose, u32) -> bool,
+) {
+    let Some(mut reference) = reference(session) else { return };
     let tree = session.tree();
     let levels = session.scene().level_count();
     assert!(levels >= 4, "{levels} levels");
-    let poses = poses(&session, &folder.path().join("out"));
+    let poses = poses(session, &folder.join("out"));
     let (mut surface, mut gaps, mut extra, mut wrong) = (0, 0, 0, Vec::new());
-    for (name, front) in fronts(tree) {
-        for (number, pose) in poses.iter().enumerate() {
+    for (number, pose) in poses.iter().enumerate() {
+        for (name, front) in fronts(tree, &|node| may_stop(pose, node)) {
             let found = inspect(&mut reference, pose, &front);
             surface += found.reference_pixels;
             gaps += found.gap_pixels;
@@ -169,10 +214,14 @@ fn closed_cities_show_no_background_through_any_mixture_of_levels() {
         "{gaps} gap pixels, all at outlines but {wrong:?}, and {extra} too many, of {surface}"
     );
     assert!(surface > 10_000_000, "{surface} pixels");
-    assert!(wrong.is_empty(), "background through the model (front, view, pixels): {wrong:?}");
+    let through: u64 = wrong.iter().map(|&(.., pixels, _)| pixels).sum();
+    assert!(
+        through as f64 <= most * surface as f64,
+        "background through the model (front, view, pixels): {wrong:?}"
+    );
 
     // The same catches a hole: leaves alone show no gap, and leaves without one of them do.
-    let leaves = front(tree, |_| false);
+    let leaves = front(tree, &|_| true, |_| false);
     let (mut caught, mut seen) = (0, 0);
     for pose in &poses {
         let whole = inspect(&mut reference, pose, &leaves);

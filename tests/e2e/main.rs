@@ -7,6 +7,7 @@ mod support;
 mod cli;
 mod crash;
 mod determinism;
+mod districts;
 mod encodings;
 mod golden;
 mod groups;

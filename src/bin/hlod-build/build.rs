@@ -30,6 +30,10 @@ pub struct BuildArgs {
     /// `groups`, or `grid:METRES`
     #[arg(long, value_name = "MODE", default_value = "auto", help_heading = "Hierarchy")]
     blocks: BlockMode,
+    /// Nodes above the blocks, so that a view of a whole city costs the same however many blocks it
+    /// has: `on`, or `off`, where the roots of all blocks are drawn at least
+    #[arg(long, value_enum, default_value_t = DistrictsArg::Off, help_heading = "Hierarchy")]
+    districts: DistrictsArg,
     /// The shape of the trees
     #[arg(long, value_enum, default_value_t = TreeArg::Balanced, help_heading = "Hierarchy")]
     tree: TreeArg,
@@ -116,6 +120,12 @@ pub struct BuildArgs {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum DistrictsArg {
+    On,
+    Off,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum CompressArg {
     None,
     Meshopt,
@@ -197,6 +207,7 @@ impl BuildArgs {
                 ..Default::default()
             },
             blocks: self.blocks,
+            districts: self.districts == DistrictsArg::On,
             up: self.up.map(|up| match up {
                 UpArg::Y => UpAxis::Y,
                 UpArg::Z => UpAxis::Z,

@@ -136,7 +136,7 @@ impl Frame {
 }
 
 /// How far a polyline is from the segment between its ends, metres.
-pub(super) fn deviation(points: &[[f32; 3]]) -> f64 {
+pub(in crate::builder) fn deviation(points: &[[f32; 3]]) -> f64 {
     let [first, .., last] = points else { return 0.0 };
     let (a, b) = (wide(*first), wide(*last));
     points.iter().map(|&point| distance_to_segment(wide(point), a, b)).fold(0.0, f64::max)

@@ -2,7 +2,7 @@
 
 pub mod cap;
 pub mod chain;
-mod cover;
+pub(crate) mod cover;
 pub mod rank;
 pub mod shared;
 pub mod skirt;

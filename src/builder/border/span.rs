@@ -35,6 +35,13 @@ impl BorderSpan {
         Self { ends: [self.ends[0], last.ends[1]], ..*self }.points(path)
     }
 
+    /// The same span of chains that have other positions between theirs: `places` has where each of
+    /// them is now, by plane, chain and index.
+    pub fn at(&self, places: &[Vec<Vec<u32>>]) -> Self {
+        let now = &places[self.plane as usize][self.chain as usize];
+        Self { ends: self.ends.map(|end| now[end as usize]), ..*self }
+    }
+
     /// Whether this span goes on where another one ends.
     pub fn follows(&self, before: &Self) -> bool {
         [self.plane, self.chain, self.ends[0]] == [before.plane, before.chain, before.ends[1]]

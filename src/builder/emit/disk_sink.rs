@@ -47,6 +47,8 @@ pub struct NodeRecord {
     pub baked: Option<BakeReason>,
     /// Why it has more than it may, where it has.
     pub reason: Option<String>,
+    /// The number of its block in the scene; `None` of a district, and while blocks have none.
+    pub block: Option<u32>,
     /// What was imperfect.
     pub warnings: Warnings,
 }
@@ -149,6 +151,7 @@ impl NodeSink for DiskSink<'_> {
                 step: Some(node.step),
                 baked: node.baked,
                 reason: over_budget(node, attributes.triangles as usize),
+                block: None,
                 warnings,
             })
         })

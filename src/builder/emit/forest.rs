@@ -1,4 +1,4 @@
-//! From the trees of all blocks to the scene: order, links, monotone errors.
+//! From trees to the scene: order, links, monotone errors.
 
 use std::collections::BTreeMap;
 
@@ -13,11 +13,16 @@ pub fn make_errors_monotone(tree: &mut Tree<NodeRecord>) -> f64 {
     tree.record.geometric_error
 }
 
-/// Appends the nodes of a tree of a block, breadth first, with their links.
+/// Says of all nodes of a tree which block they are of.
+pub fn set_block(tree: &mut Tree<NodeRecord>, block: u32) {
+    tree.record.block = Some(block);
+    tree.children.iter_mut().for_each(|child| set_block(child, block));
+}
+
+/// Appends the nodes of a tree, breadth first, with their links.
 pub fn append_nodes(
     nodes: &mut Vec<Node>,
     tree: Tree<NodeRecord>,
-    block: u32,
     shared_numbers: &BTreeMap<String, u32>,
 ) {
     let mut families = vec![(None, vec![tree])];
@@ -38,7 +43,7 @@ pub fn append_nodes(
                 }
                 let next_sibling = (place + 1 < count).then_some(index + 1);
                 let node = node_of(record, shared_numbers);
-                nodes.push(Node { parent, next_sibling, level, block: Some(block), ..node });
+                nodes.push(Node { parent, next_sibling, level, ..node });
                 if !children.is_empty() {
                     next.push((Some(index), children));
                 }
@@ -60,7 +65,7 @@ fn node_of(record: NodeRecord, shared_numbers: &BTreeMap<String, u32>) -> Node {
         first_child: None,
         next_sibling: None,
         level: 0,
-        block: None,
+        block: record.block,
         triangles: record.attributes.triangles,
         textured_triangles: record.attributes.textured_triangles,
         vertices: record.attributes.vertices,

@@ -2,3 +2,4 @@
 
 pub mod disk_sink;
 pub mod forest;
+pub mod shared_textures;

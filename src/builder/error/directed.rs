@@ -10,6 +10,9 @@
 //! triangles, triangles into polygons. A polygon is clipped to what is near one triangle, which
 //! is settled, and what is left around, so that equal surfaces with other triangles take about as
 //! many polygons as their triangles overlap in.
+//!
+//! Where parts of the other surface stand for others that they may be off, how far they may be
+//! counts with the distance to them.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -34,6 +37,8 @@ const MOST_CORNERS: usize = 24;
 pub(super) struct Largest {
     /// Found at a point.
     pub found: f32,
+    /// The part of the other surface that is nearest there.
+    pub near: u32,
     /// No part that is settled is farther.
     pub settled: f32,
     /// Whether the budget was too small.
@@ -45,7 +50,7 @@ pub(super) struct Largest {
 impl Largest {
     /// Nothing less than `least` is told apart.
     pub fn at_least(least: f32) -> Self {
-        Self { found: least, settled: 0.0, exhausted: false, divisions: 0 }
+        Self { found: least, near: 0, settled: 0.0, exhausted: false, divisions: 0 }
     }
 
     /// No point of either surface is farther.
@@ -55,6 +60,12 @@ impl Largest {
 
     fn limit(&self) -> f32 {
         self.found * TIGHTNESS
+    }
+
+    fn find(&mut self, distance: f32, near: TriangleId) {
+        if distance > self.found {
+            (self.found, self.near) = (distance, near.part);
+        }
     }
 
     /// Whether what is not farther than this needs no division.
@@ -89,6 +100,8 @@ pub(super) struct Directed<'a> {
     marks: Option<Marks>,
     /// By how much computed distances may be wrong.
     rounding: f32,
+    /// The most that a part of the other surface may be off.
+    most_off: f32,
     search: Search<'a>,
     overlay: Overlay<'a>,
     largest: Largest,
@@ -108,13 +121,14 @@ struct Open {
 /// Measures some points, spread evenly.
 pub(super) fn seed(from: &Original, to: &Original, largest: &mut Largest) {
     let mut search = Search::new(to);
+    let most_off = to.most_off();
     let leaves: usize = from.parts.iter().map(|part| part.bvh.leaves.len()).sum();
     let leaves_of = |part: usize| from.parts[part].bvh.leaves.iter();
     let all = (0..from.parts.len()).flat_map(leaves_of);
     for leaf in all.step_by(leaves.div_ceil(from.constants.seeds)) {
         for point in leaf.lane(0).corners() {
-            let near = search.nearest(point, largest.found);
-            largest.found = largest.found.max(near.squared.sqrt());
+            let near = search.nearest(point, (largest.found - most_off).max(0.0));
+            largest.find(near.squared.sqrt() + to.off(near.id.part), near.id);
         }
     }
 }
@@ -125,7 +139,8 @@ impl<'a> Directed<'a> {
         let constants = from.constants;
         let budget = constants.divisions.max(constants.divisions_per_triangle * triangles);
         let (search, overlay) = (Search::new(to), Overlay::new(to));
-        Self { from, marks: None, rounding, search, overlay, largest, budget, constants }
+        let most_off = to.most_off();
+        Self { from, marks: None, rounding, most_off, search, overlay, largest, budget, constants }
     }
 
     /// With what the way back has told. The surface it goes to must be of one mesh.
@@ -152,10 +167,21 @@ impl<'a> Directed<'a> {
 
     /// Measures a point of the surface, to no less than `enough` or the largest so far.
     fn measure(&mut self, point: Vec3, enough: f32) -> (f32, TriangleId) {
-        let near = self.search.nearest(point, enough.min(self.largest.found));
-        let distance = near.squared.sqrt();
-        self.largest.found = self.largest.found.max(distance);
-        (distance, near.id)
+        let near = self.nearest(point, enough.min(self.largest.found));
+        self.largest.find(near.0, near.1);
+        near
+    }
+
+    /// The distance to the nearest triangle and what its part may be off, or one that is not above
+    /// `enough`.
+    fn nearest(&mut self, point: Vec3, enough: f32) -> (f32, TriangleId) {
+        let near = self.search.nearest(point, (enough - self.most_off).max(0.0));
+        (near.squared.sqrt() + self.off(near.id), near.id)
+    }
+
+    /// How far the other surface may be off at a triangle.
+    fn off(&self, at: TriangleId) -> f32 {
+        self.search.original().off(at.part)
     }
 
     /// Measures the centre of a part that reaches so far from there, to no less than what settles
@@ -173,8 +199,8 @@ impl<'a> Directed<'a> {
         let limit = self.largest.limit();
         // Otherwise not even a centre on the other surface would do.
         if reach < limit {
-            let near = self.search.nearest(bounds.centre(), limit - reach);
-            if self.largest.settles(near.squared.sqrt() + reach) {
+            let (distance, _) = self.nearest(bounds.centre(), limit - reach);
+            if self.largest.settles(distance + reach) {
                 return;
             }
         }
@@ -217,12 +243,13 @@ impl<'a> Directed<'a> {
                 bounds[chosen] = bounds[chosen].min(distance + reach);
                 near
             });
+            let off = self.off(start);
             let triangle = self.search.original().triangle(start);
             let squared = [0, 1, 2].map(|corner| triangle.squared_distances(&corners[corner]));
             let [a, b, c] = squared;
             let tried = unsettled;
             for lane in (0..LANES).filter(|lane| tried >> lane & 1 == 1) {
-                bounds[lane] = bounds[lane].min(max(max(a[lane], b[lane]), c[lane]).sqrt());
+                bounds[lane] = bounds[lane].min(max(max(a[lane], b[lane]), c[lane]).sqrt() + off);
                 if self.largest.settles(bounds[lane]) {
                     unsettled &= !(1 << lane);
                 }
@@ -234,7 +261,7 @@ impl<'a> Directed<'a> {
             unsettled &= !(1 << chosen);
             for (corners, squared) in corners.iter().zip(squared) {
                 // Others are known to be nearer than what was found.
-                if marked.is_none() && squared[chosen] > self.largest.found.powi(2) {
+                if marked.is_none() && squared[chosen].sqrt() + off > self.largest.found {
                     self.measure(corners.lane(chosen), self.largest.found);
                 }
             }
@@ -263,9 +290,12 @@ impl<'a> Directed<'a> {
     }
 
     fn settles_overlay(&mut self, triangle: &Triangle, id: TriangleId, start: TriangleId) -> bool {
-        let limit = self.largest.limit();
+        let limit = self.largest.limit() - self.most_off;
+        if limit <= 0.0 {
+            return false;
+        }
         let bound = self.overlay.bound(triangle, id.slot(), start, limit, self.rounding);
-        bound.is_some_and(|bound| self.largest.settles(bound))
+        bound.is_some_and(|bound| self.largest.settles(bound + self.most_off))
     }
 
     /// Divides a triangle and what it is divided into, to some number of polygons.
@@ -320,9 +350,10 @@ impl<'a> Directed<'a> {
         if self.largest.settles(bound) {
             return;
         }
+        let off = self.off(near);
         let triangle = self.search.original().triangle(near);
         let (farthest, number) = farthest_corner(&triangle, &corners);
-        let bound = bound.min(farthest);
+        let bound = bound.min(farthest + off);
         if self.largest.settles(bound) {
             return;
         }
@@ -331,11 +362,11 @@ impl<'a> Directed<'a> {
             reach > self.constants.much_larger * f64::from(triangle.length + 2.0 * limit);
         if corners.len() <= MOST_CORNERS && !much_larger {
             // What is clipped exactly to the limit would seem to be beyond it half of the time.
-            let near = f64::from(limit - self.rounding);
-            let clipped = clip(&corners, centre, reach, &triangle, near);
-            if let Some(Clipped { inside, outside }) = clipped {
+            let near = f64::from(limit - self.rounding - off);
+            let clipped = (near > 0.0).then(|| clip(&corners, centre, reach, &triangle, near));
+            if let Some(Clipped { inside, outside }) = clipped.flatten() {
                 let (farthest, _) = farthest_corner(&triangle, &inside);
-                if self.largest.settles(farthest) {
+                if self.largest.settles(farthest + off) {
                     parts.extend(outside.into_iter().map(|corners| Part::new(corners, bound)));
                     return;
                 }

@@ -4,10 +4,12 @@
 //! - `bvh`, `triangle`: its hierarchy, and eight triangles at a time
 //! - `directed`, `polygon`: the bound on the largest distance, one way
 //! - `overlay`, `adjacency`: proving that a triangle is near by walking over the other surface
+//! - `detail`: the same where the original is known by surfaces that are off it themselves
 //! - `samples`: points for the mean, and [`MeanDistance`] to choose among meshes by it
 
 mod adjacency;
 mod bvh;
+mod detail;
 mod directed;
 mod mean;
 mod nearest;
@@ -18,6 +20,7 @@ mod samples;
 mod stored;
 mod triangle;
 
+pub use self::detail::{Detail, error_through};
 pub use self::directed::TIGHTNESS;
 use self::directed::{Directed, Largest, seed};
 pub use self::mean::MeanDistance;

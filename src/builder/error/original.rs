@@ -27,6 +27,8 @@ pub struct Original {
     pub(super) longest: f32,
     /// How it is measured.
     pub(super) constants: MeasureConstants,
+    /// How far each part may be off what it stands for, metres; empty where no part is.
+    offs: Arc<[f32]>,
 }
 
 /// One mesh.
@@ -172,7 +174,23 @@ impl Original {
             links: Arc::new(Links::between(parts.iter().map(|part| &part.adjacency))),
             parts,
             constants,
+            offs: Arc::default(),
         }
+    }
+
+    /// The same surface, whose parts stand for others that they may be so far off, metres.
+    pub(super) fn with_offs(self, offs: impl IntoIterator<Item = f32>) -> Self {
+        Self { offs: offs.into_iter().collect(), ..self }
+    }
+
+    /// How far a part may be off what it stands for.
+    pub(super) fn off(&self, part: u32) -> f32 {
+        self.offs.get(part as usize).copied().unwrap_or(0.0)
+    }
+
+    /// The most that any part is.
+    pub(super) fn most_off(&self) -> f32 {
+        self.offs.iter().copied().fold(0.0, f32::max)
     }
 
     /// Whether there is no triangle.

@@ -3,10 +3,20 @@
 use super::SurfaceError;
 
 impl SurfaceError {
-    /// The same of an original that is itself so many metres off the source at most.
-    pub fn plus(self, moved: f64) -> Self {
-        let Self { bound, mean, rms, p95 } = self;
-        Self { bound: bound + moved, mean: mean + moved, rms: rms + moved, p95: p95 + moved }
+    /// All of a surface is so many metres off.
+    pub fn everywhere(metres: f64) -> Self {
+        Self { bound: metres, mean: metres, rms: metres, p95: metres }
+    }
+
+    /// The same of an original that is itself so far off the source, at most: of distances, the
+    /// triangle inequality.
+    pub fn plus(self, off: &Self) -> Self {
+        Self {
+            bound: self.bound + off.bound,
+            mean: self.mean + off.mean,
+            rms: self.rms + off.rms,
+            p95: self.p95 + off.p95,
+        }
     }
 
     /// With the bound of another where that is larger: bounds never shrink towards the root.

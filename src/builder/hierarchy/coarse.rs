@@ -101,6 +101,20 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         source: NodeSurface,
         node: CoarseNode,
     ) -> Result<(Outcome<S::Record>, NodeSurface)> {
+        let off = SurfaceError::everywhere(source.moved);
+        let measure = |original: &Original, mesh: &Mesh| {
+            Ok(self.stages.time(Stage::Measure, || surface_error(original, mesh)).plus(&off))
+        };
+        self.measured_node(source, node, measure)
+    }
+
+    /// The same where the distance of a mesh from the source is measured so.
+    pub(super) fn measured_node(
+        &self,
+        source: NodeSurface,
+        node: CoarseNode,
+        measure: impl FnOnce(&Original, &Mesh) -> Result<SurfaceError>,
+    ) -> Result<(Outcome<S::Record>, NodeSurface)> {
         let Attempt { coarse, reason, kept, within_budget } = self.attempt(&source, &node);
         let NodeSurface { original, moved, error: below, .. } = source;
         let Coarse { simplified: Simplified { mesh, border, step, .. }, spans, skirts } = coarse;
@@ -110,9 +124,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             // Nobody draws it: what is above need not be farther off than what is below.
             (Outcome::LeftOut(LeftOut { child_path, triangles, kept }), below)
         } else {
-            let measured =
-                self.stages.time(Stage::Measure, || surface_error(&original, &mesh)).plus(moved);
-            let error = measured.at_least(&below);
+            let error = measure(&original, &mesh)?.at_least(&below);
             let on_border = |&&planes: &&u64| planes & node.path.bits() != 0;
             // Of what is written alone: parents take their colours from the original, too.
             let painted =

@@ -4,6 +4,7 @@
 //! node whose children are all leaves is simplified from the original while these are made (Cozzi
 //! & Loo, section 5.3), any other from its children's results. Work is parallel over children.
 
+mod above;
 mod coarse;
 mod divide;
 pub mod node;
@@ -16,6 +17,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+pub use self::above::Below;
 pub use self::node::{Forest, NodeDraft, NodeSink, Tree};
 pub use self::options::{BorderMode, HierarchyOptions, SimplifyFrom, TreeShape};
 pub use self::outline::LeftOut;
@@ -173,7 +175,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             child_path,
             budget: triangles,
             within_budget: None,
-            error: SurfaceError::default().plus(moved),
+            error: SurfaceError::everywhere(moved),
             step: LadderStep::Original,
             baked: None,
             locked: 0,
@@ -206,7 +208,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             BorderMode::Skirts => original_spans(&mesh, &border, node.path),
             BorderMode::Locked | BorderMode::Shared => Vec::new(),
         };
-        let error = SurfaceError::default().plus(moved);
+        let error = SurfaceError::everywhere(moved);
         NodeSurface { mesh, border, spans, original, moved, error, baked: false }
     }
 }

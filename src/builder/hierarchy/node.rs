@@ -71,3 +71,11 @@ pub struct Tree<R> {
     /// In the order in which they were cut off.
     pub children: Vec<Tree<R>>,
 }
+
+impl<R> Tree<R> {
+    /// Visits all records, parents first.
+    pub fn for_each<'a>(&'a self, visit: &mut impl FnMut(&'a R)) {
+        visit(&self.record);
+        self.children.iter().for_each(|child| child.for_each(visit));
+    }
+}

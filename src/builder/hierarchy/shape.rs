@@ -72,6 +72,12 @@ impl Resolutions {
         Self { tree: options.tree, desired_tris, level_factor, constants, factors }
     }
 
+    /// Of a node of `budget` triangles that stands above others, which have so many.
+    pub fn above(triangles: usize, budget: usize, options: &HierarchyOptions) -> Self {
+        let factor = (triangles as f64 / budget as f64).max(1.0);
+        Self { factors: vec![factor, 1.0], ..Self::new(1, options) }
+    }
+
     /// Source triangles for one of a node, by resolution, coarsest first; the last is 1.
     pub fn factors(&self) -> &[f64] {
         &self.factors

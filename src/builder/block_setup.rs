@@ -1,0 +1,169 @@
+//! What it takes to build nodes from a chunk of a model, of a block or of a district.
+
+use crate::builder::emit::disk_sink::DiskSink;
+use crate::builder::hierarchy::{BlockBuilder, HierarchyOptions, Resolutions};
+use crate::builder::options::BuildOptions;
+use crate::builder::progress::Progress;
+use crate::builder::simplify::aggregate::Extrudable;
+use crate::builder::simplify::orient::reorientable;
+use crate::builder::stages::{Stage, Stages};
+use crate::format::{Encoding, OutputDir};
+use crate::lattice::Lattice;
+use crate::mesh::{Mesh, Model, Part, UpAxis};
+use crate::texture::{
+    BakeClasses, BlockTextures, Seams, SharedTextures, TextureCache, TextureOptions, TexturePlan,
+    TextureUse, texture_factors,
+};
+
+/// Where nodes go, and how they are built.
+#[derive(Clone, Copy)]
+pub struct Target<'a> {
+    /// How.
+    pub options: &'a BuildOptions,
+    /// The output folder.
+    pub out: &'a OutputDir,
+    /// Repeating textures of the whole build.
+    pub shared: &'a SharedTextures,
+    /// Where the time goes.
+    pub stages: &'a Stages,
+    /// Told of finished leaves.
+    pub progress: &'a dyn Progress,
+}
+
+/// How the materials of a model may be treated.
+pub struct Looks {
+    /// Which textures are cut up.
+    pub textures: TexturePlan,
+    /// Which materials may lose their seams.
+    pub classes: BakeClasses,
+    /// Which materials prisms may have.
+    pub extrudable: Extrudable,
+}
+
+impl Looks {
+    /// Of a model whose untextured materials are merged.
+    pub fn new(model: &Model, seams: Seams) -> Self {
+        let textures = TexturePlan::new(model);
+        let is_cut_up = |material: u32| {
+            let texture = textures.texture_of(material);
+            texture.map(|texture| textures.texture_use(texture)) == Some(TextureUse::Atlas)
+                && seams != Seams::Keep
+        };
+        let classes = BakeClasses::new(&model.materials, is_cut_up);
+        let is_textured = |material: u32| textures.texture_of(material).is_some();
+        let extrudable = Extrudable::new(model.materials.len(), is_textured, &classes);
+        Self { textures, classes, extrudable }
+    }
+
+    /// Of each part the material that stands for what it looks like; `None` where its colours may not
+    /// leave its triangles.
+    pub fn kinds(&self, parts: &[Part]) -> Vec<Option<u32>> {
+        let is_plain = |&material: &u32| self.textures.texture_of(material).is_none();
+        let plain = |part: &Part| Some(part.material).filter(is_plain);
+        parts.iter().map(|part| self.classes.of(part.material).or_else(|| plain(part))).collect()
+    }
+}
+
+/// Where a block is, and what its files are called.
+pub struct BlockPlace {
+    /// Beginning of its file names; unique in the output.
+    pub prefix: String,
+    /// Source coordinates of its origin.
+    pub origin: [f64; 3],
+    /// Of its vertices.
+    pub lattice: Lattice,
+}
+
+/// What all blocks of a model have in common.
+pub struct BlockSetup<'a> {
+    target: Target<'a>,
+    up: UpAxis,
+    cache: &'a TextureCache<'a>,
+    extrudable: &'a Extrudable,
+    reorientable: Vec<bool>,
+    hierarchy: HierarchyOptions,
+}
+
+impl<'a> BlockSetup<'a> {
+    /// For the model whose textures are in `cache`.
+    pub fn new(
+        target: Target<'a>,
+        up: UpAxis,
+        cache: &'a TextureCache<'a>,
+        extrudable: &'a Extrudable,
+    ) -> Self {
+        let mut hierarchy = target.options.hierarchy.clone();
+        if target.options.quantize.is_some() {
+            // Vertices are beside their planes by steps that show.
+            hierarchy.tolerance.sliver_steps = hierarchy.tolerance.sliver_steps.min(1.0);
+        }
+        let reorientable = cache.model().materials.iter().map(reorientable).collect();
+        Self { target, up, cache, extrudable, reorientable, hierarchy }
+    }
+
+    /// The pictures of a block of this mesh at all its levels.
+    pub fn textures(&self, mesh: &Mesh, resolutions: &Resolutions) -> BlockTextures<'a> {
+        let Target { options, shared, stages, .. } = self.target;
+        let factors = resolutions.factors();
+        let texture_options = TextureOptions {
+            jpeg_quality: options.jpeg_quality,
+            max_atlas: options.max_atlas,
+            seams: options.hierarchy.seams,
+            root_triangles: (mesh.triangles.len() as f64 / factors[0]) as usize,
+        };
+        stages.time(Stage::Pictures, || {
+            let level_factor = f64::from(options.hierarchy.level_factor);
+            let texel_factors = texture_factors(factors, level_factor);
+            BlockTextures::prepare(self.cache, shared, mesh, &texel_factors, texture_options)
+        })
+    }
+
+    /// Where the nodes of a block go.
+    pub fn sink<'b>(&self, textures: &'b BlockTextures<'a>, place: &BlockPlace) -> DiskSink<'b>
+    where
+        'a: 'b,
+    {
+        let Target { options, out, stages, progress, .. } = self.target;
+        let step = options.quantization().map(|quantization| quantization.step);
+        DiskSink {
+            textures,
+            out,
+            prefix: place.prefix.clone(),
+            origin: place.origin,
+            up: self.up,
+            encoding: Encoding { step, compress: options.compress },
+            textured_weight: options.textured_weight,
+            stages,
+            progress,
+        }
+    }
+
+    /// Builds the nodes of a block.
+    pub fn builder<'b>(
+        &'b self,
+        sink: &'b DiskSink<'b>,
+        resolutions: Resolutions,
+        lattice: Lattice,
+    ) -> BlockBuilder<'b, DiskSink<'b>> {
+        let Target { options, stages, .. } = self.target;
+        BlockBuilder {
+            options: &self.hierarchy,
+            resolutions,
+            bake: sink.textures.bake_plan().filter(|_| has_room_for_charts(options)),
+            lattice,
+            quantization: options.quantization(),
+            up: self.up,
+            reorientable: &self.reorientable,
+            extrudable: self.extrudable,
+            sink,
+            stages,
+        }
+    }
+}
+
+/// Whether charts of their own fit into the atlases of nodes: each takes cells of up to 8 by 8
+/// texels, and a node has hardly more charts than triangles.
+fn has_room_for_charts(options: &BuildOptions) -> bool {
+    let cells = (u64::from(options.max_atlas) / 8).pow(2);
+    cells >= 4 * u64::from(options.hierarchy.desired_tris).max(1000)
+}

@@ -1,0 +1,497 @@
+//! Where the districts of a level meet: how their common borders thin, alike on all sides.
+//!
+//! Members of neighbouring districts have the same vertices along the cutting planes that divided
+//! their blocks. What a plane's border keeps at the next level is decided once for both sides
+//! ([`CutPlane`]), from the surfaces of both. The strips that members have over what they left of the
+//! original border (skirts) go into the polylines, so that those of the district reach as far as
+//! any below it: a district closes the gap to neighbours of any level.
+//!
+//! Vertices that members share elsewhere are no border of a plane, and stay.
+
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::builder::border::chain::{BorderVertex, Chain, CutPlane, KeepRule};
+use crate::builder::border::rank::SurfaceQuadric;
+use crate::builder::border::shared::{Bounds, bounds_of, shared_positions};
+use crate::builder::border::span::BorderSpan;
+use crate::builder::border::vertex::{Border, Path};
+use crate::builder::cut::split::Chunk;
+use crate::mesh::{Mesh, PositionKey, key, wide};
+
+/// A district has at most so many planes around it; at what is beyond them nothing thins.
+const MOST_PLANES: usize = 60;
+
+/// A plane: its axis and the bits of its coordinate, which order as they are hashed.
+type PlaneKey = (usize, u64);
+
+type EdgeKey = [PositionKey<f64>; 2];
+
+/// The borders between the districts of a level.
+#[derive(Debug, Default)]
+pub struct LevelBorder {
+    planes: BTreeMap<PlaneKey, Arc<CutPlane<f64>>>,
+    /// Vertices that stay.
+    kept: FxHashSet<PositionKey<f64>>,
+}
+
+/// The border vertices of a plane, numbered, and their edges.
+#[derive(Default)]
+struct PlaneEdges {
+    numbers: FxHashMap<PositionKey<f64>, u32>,
+    vertices: Vec<[f64; 3]>,
+    edges: Vec<[u32; 2]>,
+}
+
+impl PlaneEdges {
+    fn vertex(&mut self, position: [f64; 3]) -> u32 {
+        let next = self.vertices.len() as u32;
+        *self.numbers.entry(key(position)).or_insert_with(|| {
+            self.vertices.push(position);
+            next
+        })
+    }
+}
+
+impl LevelBorder {
+    /// Between the members of so many districts, of which `rule` says what is kept.
+    pub fn between(districts: &[&Mesh<f64>], rule: &KeepRule) -> Self {
+        let bounds: Vec<Bounds> =
+            districts.iter().map(|mesh| bounds_of(mesh.positions.iter().copied())).collect();
+        let positions = |district: usize| districts[district].positions.iter().copied();
+        let shared = shared_positions(&bounds, positions);
+        if shared.is_empty() {
+            return Self::default();
+        }
+        let open: Vec<Vec<[[f64; 3]; 2]>> = districts.iter().map(|mesh| open_edges(mesh)).collect();
+        let is_shared = |end: &[f64; 3]| shared.contains(&key(*end));
+        let common = || open.iter().flatten().filter(|ends| ends.iter().all(is_shared));
+        let mut edges_in: BTreeMap<PlaneKey, usize> = BTreeMap::new();
+        for plane in common().flat_map(planes_of) {
+            *edges_in.entry(plane).or_default() += 1;
+        }
+        // An edge along a cut may be level by chance: the plane that others are in, too.
+        let best = |ends: &[[f64; 3]; 2]| {
+            planes_of(ends).max_by_key(|plane| (edges_in[plane], Reverse(*plane)))
+        };
+        let mut planes: BTreeMap<PlaneKey, PlaneEdges> =
+            common().filter_map(best).map(|plane| (plane, PlaneEdges::default())).collect();
+        let best = |ends: &[[f64; 3]; 2]| {
+            let of_border = planes_of(ends).filter(|plane| edges_in.contains_key(plane));
+            of_border.max_by_key(|plane| (edges_in[plane], Reverse(*plane)))
+        };
+        // Also those of one side alone, where the other closed up.
+        let mut seen: FxHashSet<EdgeKey> = FxHashSet::default();
+        let mut kept: FxHashSet<PositionKey<f64>> = FxHashSet::default();
+        for ends in open.iter().flatten() {
+            if !seen.insert(edge_key(*ends)) {
+                continue;
+            }
+            match best(ends).filter(|plane| planes.contains_key(plane)) {
+                Some(plane) => {
+                    let plane = planes.entry(plane).or_default();
+                    let edge = ends.map(|end| plane.vertex(end));
+                    plane.edges.push(edge);
+                }
+                // Not along a plane, though both ends are of another district too.
+                None if ends.iter().all(is_shared) => kept.extend(ends.map(key)),
+                None => {}
+            }
+        }
+        // Shared vertices of no border at all.
+        let mut on_planes: FxHashMap<PositionKey<f64>, u32> = FxHashMap::default();
+        for &vertex in planes.values().flat_map(|plane| &plane.vertices) {
+            *on_planes.entry(key(vertex)).or_default() += 1;
+        }
+        kept.extend(shared.iter().filter(|position| !on_planes.contains_key(position)));
+        let surfaces = surfaces(districts, &on_planes);
+        let ranked = |plane: PlaneEdges, (axis, bits): PlaneKey| {
+            let vertex = |&position: &[f64; 3]| {
+                let at = key(position);
+                let fixed = kept.contains(&at) || on_planes[&at] > 1;
+                BorderVertex { position, fixed, surface: surfaces[&at] }
+            };
+            let vertices: Vec<_> = plane.vertices.iter().map(vertex).collect();
+            let coordinate = f64::from_bits(bits);
+            Arc::new(CutPlane::new(axis, coordinate, &vertices, &plane.edges, rule))
+        };
+        let planes = planes
+            .into_iter()
+            .filter(|(_, plane)| !plane.edges.is_empty())
+            .map(|(at, plane)| (at, ranked(plane, at)))
+            .collect();
+        Self { planes, kept }
+    }
+
+    /// Gives a district its part of the borders.
+    pub fn mark(&self, chunk: &mut Chunk<f64>) {
+        let positions = &chunk.mesh.positions;
+        chunk.border = Border::interior(positions.len());
+        let at = |plane: &CutPlane<f64>| -> Vec<(usize, u8)> {
+            let level = |(vertex, &position): (usize, &[f64; 3])| {
+                Some((vertex, plane.keep_level(position)?))
+            };
+            positions.iter().enumerate().filter_map(level).collect()
+        };
+        let mut path = Path::default();
+        let mut kept: Vec<usize> = (0..positions.len())
+            .filter(|&vertex| self.kept.contains(&key(positions[vertex])))
+            .collect();
+        for plane in self.planes.values() {
+            let vertices = at(plane);
+            if vertices.is_empty() {
+                continue;
+            }
+            if path.len() >= MOST_PLANES {
+                kept.extend(vertices.iter().map(|&(vertex, _)| vertex));
+                continue;
+            }
+            for (vertex, level) in vertices {
+                chunk.border.planes[vertex] |= 1 << path.len();
+                chunk.border.keep[vertex] = level;
+            }
+            path = path.with(Arc::clone(plane));
+        }
+        if !kept.is_empty() {
+            for vertex in kept {
+                chunk.border.planes[vertex] |= 1 << path.len();
+                chunk.border.keep[vertex] = 0;
+            }
+            path = path.with(Arc::new(CutPlane::from_chains(0, f64::NAN, Vec::new())));
+        }
+        chunk.path = path;
+    }
+}
+
+/// The borders of a district whose polylines have what skirts of its members cover between two
+/// vertices, so that skirts over them cover that too.
+pub struct Widened {
+    /// The planes.
+    pub path: Path,
+    /// The district's border, edge by edge.
+    pub spans: Vec<BorderSpan>,
+}
+
+impl Widened {
+    /// Of a path and spans of it, by skirts in its coordinates.
+    pub fn by(skirts: &[Vec<DVec3>], path: &Path, spans: Vec<BorderSpan>) -> Self {
+        let mut wider = Path::default();
+        let mut places = Vec::with_capacity(path.len());
+        for bit in 0..path.len() as u32 {
+            let plane = path.plane(bit);
+            let in_plane = |skirt: &&Vec<DVec3>| {
+                skirt.iter().all(|corner| corner[plane.axis] as f32 == plane.coordinate)
+            };
+            let polygons = skirts.iter().filter(in_plane);
+            let polygons: Vec<Polygon> =
+                polygons.filter_map(|skirt| Polygon::new(skirt, plane.axis)).collect();
+            let chains = plane.chains.iter().map(|chain| widened(chain, plane.axis, &polygons));
+            let (chains, of_plane): (Vec<Chain>, Vec<Vec<u32>>) = chains.unzip();
+            let plane = CutPlane::from_chains(plane.axis, plane.coordinate, chains);
+            wider = wider.with(Arc::new(plane));
+            places.push(of_plane);
+        }
+        let spans = spans.into_iter().map(|span| span.at(&places)).collect();
+        Self { path: wider, spans }
+    }
+}
+
+/// The chain with what polygons have beside its edges that they contain, and where its positions are
+/// now.
+fn widened(chain: &Chain, axis: usize, polygons: &[Polygon]) -> (Chain, Vec<u32>) {
+    let flat: Vec<DVec2> = chain.positions.iter().map(|&at| flattened(wide(at), axis)).collect();
+    // By edge, what is beside it.
+    let mut beside: Vec<Vec<DVec2>> = vec![Vec::new(); flat.len()];
+    for polygon in polygons {
+        let contains = |&edge: &usize| polygon.contains(0.5 * (flat[edge] + flat[edge + 1]));
+        let mut first = 0;
+        while first + 1 < flat.len() {
+            let count = (first..flat.len() - 1).take_while(contains).count();
+            if count > 0 {
+                polygon.share_out(&flat[first..=first + count], &mut beside[first..first + count]);
+            }
+            first += count + 1;
+        }
+    }
+    let mut wider = Chain::default();
+    let mut places = Vec::with_capacity(flat.len());
+    for ((&position, &keep), beside) in chain.positions.iter().zip(&chain.keep).zip(beside) {
+        places.push(wider.positions.len() as u32);
+        wider.positions.push(position);
+        wider.keep.push(keep);
+        wider.keep.extend(beside.iter().map(|_| u8::MAX));
+        wider.positions.extend(beside.iter().map(|&at| raised(at, axis, position[axis])));
+    }
+    (wider, places)
+}
+
+/// The coordinates of a point in a plane across `axis`.
+fn flattened(point: DVec3, axis: usize) -> DVec2 {
+    match axis {
+        0 => DVec2::new(point.y, point.z),
+        1 => DVec2::new(point.x, point.z),
+        _ => DVec2::new(point.x, point.y),
+    }
+}
+
+/// The way back from [`flattened`].
+fn raised(point: DVec2, axis: usize, coordinate: f32) -> [f32; 3] {
+    let [u, v] = point.as_vec2().to_array();
+    match axis {
+        0 => [coordinate, u, v],
+        1 => [u, coordinate, v],
+        _ => [u, v, coordinate],
+    }
+}
+
+/// A convex polygon in a plane, counter-clockwise.
+struct Polygon {
+    corners: Vec<DVec2>,
+}
+
+impl Polygon {
+    /// `None` where it has no area.
+    fn new(corners: &[DVec3], axis: usize) -> Option<Self> {
+        let mut corners: Vec<DVec2> = corners.iter().map(|&at| flattened(at, axis)).collect();
+        let next = |at: usize| (at + 1) % corners.len();
+        let area: f64 = (0..corners.len()).map(|at| corners[at].perp_dot(corners[next(at)])).sum();
+        if area < 0.0 {
+            corners.reverse();
+        }
+        (area != 0.0).then_some(Self { corners })
+    }
+
+    fn contains(&self, point: DVec2) -> bool {
+        (0..self.corners.len()).all(|at| {
+            let (a, b) = (self.corners[at], self.corners[(at + 1) % self.corners.len()]);
+            (b - a).perp_dot(point - a) >= 0.0
+        })
+    }
+
+    /// Divides it among the edges of a polyline, across the line from its first to its last point, and
+    /// adds the corners of each share to what is beside that edge. Together they are all of it.
+    fn share_out(&self, line: &[DVec2], beside: &mut [Vec<DVec2>]) {
+        let along = line[line.len() - 1] - line[0];
+        let mut rest = self.corners.clone();
+        let mut from = f64::NEG_INFINITY;
+        for (edge, beside) in beside.iter_mut().enumerate() {
+            if edge + 2 == line.len() {
+                beside.append(&mut rest);
+                break;
+            }
+            // Where the polyline turns back, what was shared out already stays.
+            from = from.max(line[edge + 1].dot(along));
+            beside.append(&mut clip(&rest, -along, -from));
+            rest = clip(&rest, along, from);
+        }
+    }
+}
+
+/// What of a polygon is not before `least` along a direction.
+fn clip(corners: &[DVec2], along: DVec2, least: f64) -> Vec<DVec2> {
+    let mut kept = Vec::with_capacity(corners.len() + 2);
+    for (at, &corner) in corners.iter().enumerate() {
+        let next = corners[(at + 1) % corners.len()];
+        let (here, there) = (corner.dot(along) - least, next.dot(along) - least);
+        if here >= 0.0 {
+            kept.push(corner);
+        }
+        if (here > 0.0) != (there > 0.0) && here != there {
+            kept.push(corner + (next - corner) * (here / (here - there)));
+        }
+    }
+    kept
+}
+
+/// The planes across an axis that an edge lies in.
+fn planes_of([a, b]: &[[f64; 3]; 2]) -> impl Iterator<Item = PlaneKey> {
+    let planes =
+        [0, 1, 2].map(|axis| (a[axis] == b[axis]).then(|| (axis, (a[axis] + 0.0).to_bits())));
+    planes.into_iter().flatten()
+}
+
+fn edge_key(ends: [[f64; 3]; 2]) -> EdgeKey {
+    let [a, b] = ends.map(key);
+    if a <= b { [a, b] } else { [b, a] }
+}
+
+/// The edges that an odd number of triangles have, in order of their ends.
+fn open_edges(mesh: &Mesh<f64>) -> Vec<[[f64; 3]; 2]> {
+    let mut count: FxHashMap<EdgeKey, (u32, [u32; 2])> = FxHashMap::default();
+    for &[a, b, c] in &mesh.triangles {
+        for ends in [[a, b], [b, c], [c, a]] {
+            let positions = ends.map(|end| mesh.positions[end as usize]);
+            count.entry(edge_key(positions)).or_insert((0, ends)).0 += 1;
+        }
+    }
+    let mut open: Vec<(EdgeKey, [u32; 2])> = count
+        .into_iter()
+        .filter(|(_, (uses, _))| uses % 2 == 1)
+        .map(|(edge, (_, ends))| (edge, ends))
+        .collect();
+    open.sort_unstable();
+    open.into_iter().map(|(_, ends)| ends.map(|end| mesh.positions[end as usize])).collect()
+}
+
+/// The surfaces around vertices, on all sides.
+fn surfaces(
+    districts: &[&Mesh<f64>],
+    vertices: &FxHashMap<PositionKey<f64>, u32>,
+) -> FxHashMap<PositionKey<f64>, SurfaceQuadric> {
+    let mut surfaces: FxHashMap<PositionKey<f64>, SurfaceQuadric> =
+        vertices.keys().map(|&vertex| (vertex, SurfaceQuadric::default())).collect();
+    for mesh in districts {
+        for triangle in &mesh.triangles {
+            let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
+            for corner in corners {
+                if let Some(surface) = surfaces.get_mut(&key(corner)) {
+                    surface.add_triangle(corners.map(wide));
+                }
+            }
+        }
+    }
+    surfaces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::blocks::gather::localise;
+    use crate::builder::border::cover::deviation;
+    use crate::builder::border::span::{join_spans, original_spans};
+    use crate::builder::border::vertex::BorderVertexState;
+    use crate::builder::constants::BorderConstants;
+    use crate::lattice::Lattice;
+
+    const ACROSS: usize = 17;
+
+    /// A hilly field of squares of 1 m.
+    fn field(low: [f64; 2], height: impl Fn(f64, f64) -> f64) -> Mesh<f64> {
+        let mut mesh = Mesh::<f64>::default();
+        for at in 0..ACROSS * ACROSS {
+            let [x, y] = [low[0] + (at % ACROSS) as f64, low[1] + (at / ACROSS) as f64];
+            mesh.positions.push([x, y, height(x, y)]);
+            mesh.materials.push(0);
+        }
+        for at in (0..ACROSS * (ACROSS - 1)).filter(|at| at % ACROSS != ACROSS - 1) {
+            let [a, b] = [at as u32, (at + ACROSS) as u32];
+            mesh.triangles.extend([[a, a + 1, b + 1], [a, b + 1, b]]);
+        }
+        mesh
+    }
+
+    fn hills(x: f64, y: f64) -> f64 {
+        ((x * 12.9 + y * 78.2).sin() * 8.0).round() / 16.0
+    }
+
+    fn rule() -> KeepRule<'static> {
+        KeepRule {
+            shares: vec![0.5, 1.0],
+            most: Vec::new(),
+            first_level: 0,
+            collinear: 1e-6,
+            baked: None,
+            constants: BorderConstants::default(),
+        }
+    }
+
+    fn chunk(mesh: &Mesh<f64>, borders: &LevelBorder) -> Chunk<f64> {
+        let mut chunk = Chunk { mesh: mesh.clone(), ..Chunk::default() };
+        borders.mark(&mut chunk);
+        chunk
+    }
+
+    fn states(chunk: &Chunk<f64>) -> FxHashMap<PositionKey<f64>, BorderVertexState> {
+        let state = |vertex: usize| {
+            chunk.path.state(chunk.border.planes[vertex], chunk.border.keep[vertex], 0)
+        };
+        let positions = chunk.mesh.positions.iter().enumerate();
+        positions.map(|(vertex, &position)| (key(position), state(vertex))).collect()
+    }
+
+    #[test]
+    fn borders_along_planes_thin_alike_on_all_sides_and_what_is_shared_elsewhere_stays() {
+        let across = (ACROSS - 1) as f64;
+        let corners = [[0.0, 0.0], [across, 0.0], [0.0, across], [across, across]];
+        let mut meshes = corners.map(|low| field(low, hills));
+        // One vertex on the way is beside the plane, on both sides.
+        for mesh in &mut meshes {
+            for position in mesh.positions.iter_mut().filter(|at| at[0] == across && at[1] == 5.0) {
+                position[0] += 0.25;
+            }
+        }
+        let borders = LevelBorder::between(&meshes.each_ref(), &rule());
+        let chunks = meshes.each_ref().map(|mesh| chunk(mesh, &borders));
+        let all = chunks.each_ref().map(states);
+        let count = |of: BorderVertexState| all[0].values().filter(|&&state| state == of).count();
+        // Of the 33 along both planes.
+        assert!(
+            (10..=18).contains(&count(BorderVertexState::Gone)),
+            "{}",
+            count(BorderVertexState::Gone)
+        );
+        assert_eq!(count(BorderVertexState::Kept) + count(BorderVertexState::Gone), 33);
+        for (position, state) in all.iter().flatten() {
+            for other in &all {
+                assert!(other.get(position).is_none_or(|other| other == state), "{position:?}");
+            }
+        }
+        let at = |position: [f64; 3]| all[0][&key(position)];
+        let beside = [across + 0.25, 5.0, hills(across, 5.0)];
+        assert_eq!(at(beside), BorderVertexState::Kept);
+        assert_eq!(
+            at([across, across, hills(across, across)]),
+            BorderVertexState::Kept,
+            "a corner"
+        );
+        // Open, but of no other district.
+        assert_eq!(at([0.0, 3.0, hills(0.0, 3.0)]), BorderVertexState::Free);
+    }
+
+    #[test]
+    fn one_district_alone_has_no_border() {
+        let mesh = field([0.0, 0.0], hills);
+        let borders = LevelBorder::between(&[&mesh], &rule());
+        assert!(chunk(&mesh, &borders).path.is_empty());
+    }
+
+    /// What was covered below a district between two of its vertices is covered by it.
+    #[test]
+    fn polylines_go_around_what_skirts_cover_between_their_vertices() {
+        let across = (ACROSS - 1) as f64;
+        let meshes =
+            [[0.0, 0.0], [across, 0.0]].map(|low| field(low, |_, y| (y as i64 % 2) as f64));
+        let borders = LevelBorder::between(&meshes.each_ref(), &rule());
+        let chunk = chunk(&meshes[0], &borders);
+        let lattice = Lattice { step: 1.0 / 1024.0 };
+        let (chunk, _) = localise(chunk, [0.0; 3], lattice, false);
+        // A triangle below the edges from y = 2 to y = 4, and one that is not in the plane.
+        let corner = |y: f64, z: f64| DVec3::new(across, y, z);
+        let skirt = vec![corner(1.9, 1.2), corner(3.0, -4.0), corner(4.1, 1.2)];
+        let other = skirt.iter().map(|&at| at + 0.5 * DVec3::X - 9.0 * DVec3::Z).collect();
+        let spans = original_spans(&chunk.mesh, &chunk.border, &chunk.path);
+        assert_eq!(spans.len(), ACROSS - 1);
+        let wider = Widened::by(&[skirt, other], &chunk.path, spans.clone());
+        assert_eq!(wider.spans.len(), spans.len());
+        for (before, after) in spans.iter().zip(&wider.spans) {
+            assert_eq!(before.edge(&chunk.path), after.edge(&wider.path), "the same ends");
+            let y = after.points(&wider.path).iter().map(|at| at[1]);
+            let (from, to) = y.fold((f32::MAX, f32::MIN), |(a, b), y| (a.min(y), b.max(y)));
+            let depth = deviation(after.points(&wider.path));
+            let is_below = from >= 1.0 && to <= 5.0 && depth > 1e-3;
+            let y = [0, 1].map(|_| {
+                0.5 * (before.points(&chunk.path)[0][1] + before.points(&chunk.path)[1][1])
+            });
+            assert_eq!(is_below, (2.0..=4.0).contains(&y[0]), "{from} {to} {depth}");
+        }
+        let lowest = wider.spans.iter().flat_map(|span| span.points(&wider.path)).map(|at| at[2]);
+        let lowest = lowest.fold(f32::MAX, f32::min);
+        assert!((lowest + 4.0).abs() < 1e-3, "{lowest}");
+        let joined = join_spans(wider.spans.clone(), &wider.path, 0, &chunk.mesh, &chunk.border);
+        assert!(joined.len() >= ACROSS - 1, "all vertices are there");
+    }
+}

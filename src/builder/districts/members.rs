@@ -1,0 +1,175 @@
+//! The members of a district as one small model: read from their files, so that neither a source nor
+//! a build has to be in memory, nor on this machine.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::DVec3;
+
+use crate::builder::emit::disk_sink::NodeRecord;
+use crate::format::{NODES_DIR, NodeImageData, NodeMesh, Surface, TEXTURES_DIR, read_glb};
+use crate::lattice::Lattice;
+use crate::mesh::{Group, Material, Model, Part, TextureData, TextureSource, Warnings, all_differ};
+use crate::{Error, Result};
+
+/// What stood in the files of some nodes.
+pub struct Members {
+    /// Their surfaces. Textures are those of the nodes.
+    pub model: Model,
+    /// Their skirts, in source coordinates: convex, of three or four corners.
+    pub skirts: Vec<Vec<DVec3>>,
+}
+
+/// Reads nodes of the folder `out`, with all positions on a lattice.
+pub fn read<'a>(
+    out: &Path,
+    records: impl Iterator<Item = &'a NodeRecord>,
+    lattice: Lattice,
+) -> Result<Members> {
+    let mut reader = Reader {
+        out,
+        lattice,
+        model: Model {
+            source: out.to_path_buf(),
+            dependencies: Vec::new(),
+            groups: vec![Group { name: String::new() }],
+            parts: Vec::new(),
+            materials: Vec::new(),
+            textures: Vec::new(),
+            up: None,
+            warnings: Warnings::default(),
+        },
+        skirts: Vec::new(),
+        shared: BTreeMap::new(),
+    };
+    for record in records {
+        reader.add(record)?;
+    }
+    Ok(Members { model: reader.model, skirts: reader.skirts })
+}
+
+struct Reader<'a> {
+    out: &'a Path,
+    lattice: Lattice,
+    model: Model,
+    skirts: Vec<Vec<DVec3>>,
+    /// The textures of the model that are shared between nodes, by name.
+    shared: BTreeMap<String, u32>,
+}
+
+impl Reader<'_> {
+    fn add(&mut self, record: &NodeRecord) -> Result<()> {
+        let path = self.out.join(NODES_DIR).join(&record.file);
+        let bytes = std::fs::read(&path)
+            .map_err(|error| Error::output(&path, format!("cannot be read again: {error}")))?;
+        let NodeMesh { origin, images, primitives } = read_glb(&bytes, &path)?;
+        let textures: Vec<u32> = images
+            .into_iter()
+            .enumerate()
+            .map(|(number, image)| self.texture(image.data, &record.file, number))
+            .collect();
+        for primitive in primitives {
+            let texture = primitive.surface.image.map(|image| textures[image]);
+            let material = self.material(&primitive.surface, texture);
+            let place = |position: &[f32; 3]| -> [f64; 3] {
+                std::array::from_fn(|axis| {
+                    self.lattice.round(origin[axis] + f64::from(position[axis]))
+                })
+            };
+            let positions: Vec<[f64; 3]> = primitive.positions.iter().map(place).collect();
+            let source = primitive.indices.len() - 3 * primitive.skirt_triangles;
+            let (surface, skirts) = primitive.indices.split_at(source);
+            self.skirts.extend(polygons(skirts.as_chunks::<3>().0, &positions));
+            let indices: Vec<u32> = surface
+                .as_chunks::<3>()
+                .0
+                .iter()
+                .filter(|corners| all_differ(corners.map(|corner| positions[corner as usize])))
+                .flatten()
+                .copied()
+                .collect();
+            if !indices.is_empty() {
+                let (texcoords, colors) = (primitive.texcoords, primitive.colors);
+                self.model.parts.push(Part {
+                    group: 0,
+                    material,
+                    positions,
+                    texcoords,
+                    colors,
+                    indices,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn texture(&mut self, data: NodeImageData, file: &str, number: usize) -> u32 {
+        let next = self.model.textures.len() as u32;
+        let (name, data) = match data {
+            NodeImageData::Embedded { bytes, .. } => {
+                (format!("{file} {number}"), TextureData::Embedded(bytes.into()))
+            }
+            NodeImageData::Shared { file_name } => {
+                let known = self.shared.entry(file_name.to_string()).or_insert(next);
+                if *known != next {
+                    return *known;
+                }
+                let path = self.out.join(TEXTURES_DIR).join(&*file_name);
+                (name_at_full_resolution(&file_name), TextureData::File(path))
+            }
+        };
+        self.model.textures.push(TextureSource { name, data, opacity: None });
+        next
+    }
+
+    /// The material of a surface, of which there is one.
+    fn material(&mut self, surface: &Surface, texture: Option<u32>) -> u32 {
+        let materials = &mut self.model.materials;
+        let material = Material {
+            name: String::new(),
+            base_color: surface.base_color,
+            texture,
+            wrap: surface.wrap,
+            alpha: surface.alpha,
+            double_sided: surface.double_sided,
+        };
+        let same = |known: &Material| Material { name: String::new(), ..known.clone() } == material;
+        let known = materials.iter().position(same).unwrap_or_else(|| {
+            let name = materials.len().to_string();
+            materials.push(Material { name, ..material });
+            materials.len() - 1
+        });
+        known as u32
+    }
+}
+
+/// The name of a shared picture without what says how large it is, which it will say again.
+fn name_at_full_resolution(file_name: &str) -> String {
+    let mut parts = file_name.rsplitn(3, '-');
+    match (parts.next(), parts.next(), parts.next()) {
+        (Some(_), Some(_), Some(stem)) => stem.into(),
+        _ => file_name.into(),
+    }
+}
+
+/// Triangles that follow one another and have an edge in common are one polygon.
+fn polygons(triangles: &[[u32; 3]], positions: &[[f64; 3]]) -> Vec<Vec<DVec3>> {
+    let mut polygons = Vec::new();
+    let mut rest = triangles;
+    let point = |corner: u32| DVec3::from_array(positions[corner as usize]);
+    while let [first, others @ ..] = rest {
+        let [a, b, c] = *first;
+        // As the corners of a fan follow one another.
+        match others {
+            [[p, q, r], others @ ..] if (*p, *q) == (a, c) => {
+                polygons.push([a, b, c, *r].map(point).to_vec());
+                rest = others;
+            }
+            _ => {
+                polygons.push([a, b, c].map(point).to_vec());
+                rest = others;
+            }
+        }
+    }
+    polygons
+}

@@ -1,0 +1,341 @@
+//! Nodes above the blocks: a city's coarsest views.
+//!
+//! Without them the coarsest view of a city has a root for each block, and costs in proportion to the city.
+//! A district stands for neighbouring nodes ([`grouping`]) as a node stands for its children, and
+//! districts stand for districts, until there are few at the top.
+//!
+//! A district is made from its members' files alone ([`members`]): they are a model, small and with
+//! textures of its own, and the district is its root. So blocks of several inputs, of earlier builds
+//! and of other machines are one case, and what is needed of a city does not grow with its detail. How far
+//! a district is off the source is measured through its members' files and those below them
+//! ([`detail`]). Between districts, borders thin alike on both sides ([`border`]).
+
+pub mod border;
+pub mod detail;
+pub mod grouping;
+pub mod members;
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use self::border::LevelBorder;
+use self::detail::{FileDetail, Files};
+use self::grouping::{Item, groups};
+use self::members::Members;
+use crate::Result;
+use crate::builder::block_setup::{BlockPlace, BlockSetup, Looks, Target};
+use crate::builder::blocks::gather::{gather, localise};
+use crate::builder::blocks::merge_untextured::merge_untextured;
+use crate::builder::border::chain::KeepRule;
+use crate::builder::border::shared::bounds_of;
+use crate::builder::cut::split::Chunk;
+use crate::builder::emit::disk_sink::NodeRecord;
+use crate::builder::emit::shared_textures::write_textures;
+use crate::builder::error::error_through;
+use crate::builder::hierarchy::{Below, BorderMode, Resolutions, Tree};
+use crate::builder::options::BuildOptions;
+use crate::builder::progress::Progress;
+use crate::builder::reuse::Earlier;
+use crate::builder::stages::{Stage, Stages};
+use crate::builder::stitch::stitches;
+use crate::builder::threads::in_parallel;
+use crate::format::{OutputDir, SharedTexture};
+use crate::lattice::Lattice;
+use crate::mesh::{Coordinate, Model, UpAxis, Warnings};
+use crate::report::build_report::DistrictReport;
+use crate::texture::{SharedTextures, TextureCache};
+
+/// Districts are made until no more nodes than this are at the top.
+const MOST_ROOTS: usize = 8;
+
+/// The bound on a district's error is at most so many times what is sure, as far as its members are known
+/// well enough.
+const LOOSE: f64 = 1.2;
+
+/// Levels of districts, at most: a city of 8 · 2^24 blocks.
+const MOST_LEVELS: usize = 24;
+
+/// The trees of a scene, those of districts with those of their blocks below them.
+#[derive(Debug, Default)]
+pub struct Districts {
+    /// The trees.
+    pub trees: Vec<Tree<NodeRecord>>,
+    /// How each district was made, in order of files.
+    pub reports: Vec<DistrictReport>,
+    /// What was imperfect.
+    pub warnings: Warnings,
+}
+
+/// What districts are built with.
+#[derive(Clone, Copy)]
+pub struct Above<'a> {
+    /// How.
+    pub options: &'a BuildOptions,
+    /// The output folder, which has the files of what is below.
+    pub out: &'a OutputDir,
+    /// Where the time goes.
+    pub stages: &'a Stages,
+    /// Is told of leaves, of which none is made here.
+    pub progress: &'a dyn Progress,
+    /// A result whose districts are taken over where they are made of the same.
+    pub earlier: Option<&'a Earlier>,
+    /// Which axis points at the sky.
+    pub up: UpAxis,
+}
+
+/// Builds districts above trees, which may come in any order. Shared textures, which are written, are
+/// added to `textures`.
+pub fn build_districts(
+    mut trees: Vec<Tree<NodeRecord>>,
+    textures: &mut BTreeMap<String, SharedTexture>,
+    above: &Above,
+) -> Result<Districts> {
+    let &Above { options, out, stages, progress, earlier, up } = above;
+    let mut districts = Districts::default();
+    for _ in 0..MOST_LEVELS {
+        if trees.len() <= MOST_ROOTS {
+            break;
+        }
+        let before = trees.len();
+        let shared = SharedTextures::new();
+        let target = Target { options, out, shared: &shared, stages, progress };
+        let reused;
+        (trees, reused) = Level { up, target, earlier }.build(trees, &mut districts)?;
+        if let Some(earlier) = earlier {
+            earlier.link_textures(reused.keys(), out)?;
+        }
+        textures.extend(reused);
+        // The next level reads them.
+        *textures = write_textures(shared, std::mem::take(textures), out)?;
+        if trees.len() == before {
+            break;
+        }
+    }
+    sort(&mut trees);
+    districts.reports.sort_by(|a, b| a.file.cmp(&b.file));
+    districts.trees = trees;
+    Ok(districts)
+}
+
+/// One level of districts.
+struct Level<'a> {
+    up: UpAxis,
+    target: Target<'a>,
+    earlier: Option<&'a Earlier>,
+}
+
+/// A district about to be made.
+struct Draft {
+    members: Vec<Tree<NodeRecord>>,
+    model: Model,
+    looks: Looks,
+    skirts: Vec<Vec<DVec3>>,
+    chunk: Chunk<f64>,
+}
+
+/// What has become of one.
+struct Made {
+    trees: Vec<Tree<NodeRecord>>,
+    report: Option<DistrictReport>,
+    reused_textures: BTreeMap<String, SharedTexture>,
+    warnings: Warnings,
+}
+
+impl Level<'_> {
+    fn build(
+        &self,
+        mut trees: Vec<Tree<NodeRecord>>,
+        districts: &mut Districts,
+    ) -> Result<(Vec<Tree<NodeRecord>>, BTreeMap<String, SharedTexture>)> {
+        sort(&mut trees);
+        let BuildOptions { hierarchy, .. } = self.target.options;
+        let triangles = f64::from(hierarchy.desired_tris) * f64::from(hierarchy.level_factor);
+        let items: Vec<Item> = trees.iter().map(|tree| item(&tree.record)).collect();
+        let found = groups(&items, triangles, hierarchy.level_factor as usize);
+        let lattice = self.lattice(&items, &found);
+        let mut trees: Vec<Option<Tree<NodeRecord>>> = trees.into_iter().map(Some).collect();
+        let taken = |group: Vec<usize>| -> Vec<Tree<NodeRecord>> {
+            group.into_iter().filter_map(|member| trees[member].take()).collect()
+        };
+        let taken: Vec<_> = found.into_iter().map(taken).collect();
+        let drafts = in_parallel(taken, |_, members| self.draft(members, lattice))?;
+        let rule = self.keep_rule(lattice);
+        let meshes: Vec<_> = drafts.iter().map(|draft| &draft.chunk.mesh).collect();
+        let between = || LevelBorder::between(&meshes, &rule);
+        let borders = self.target.stages.time(Stage::Gather, between);
+        let made = in_parallel(drafts, |_, draft| self.district(draft, &borders, lattice))?;
+        let mut next = Vec::with_capacity(made.len());
+        let mut reused = BTreeMap::new();
+        for Made { trees, report, reused_textures, warnings } in made {
+            next.extend(trees);
+            districts.reports.extend(report);
+            reused.extend(reused_textures);
+            districts.warnings.extend(warnings);
+        }
+        Ok((next, reused))
+    }
+
+    /// One lattice for all districts of the level, so that those that meet agree on where.
+    fn lattice(&self, items: &[Item], groups: &[Vec<usize>]) -> Lattice {
+        let (mut extent, mut magnitude) = (0f64, 0f64);
+        for group in groups {
+            let corners = group.iter().flat_map(|&member| [items[member].low, items[member].high]);
+            let (low, high) = bounds_of(corners);
+            for axis in 0..3 {
+                extent = extent.max(high[axis] - low[axis]);
+                magnitude = magnitude.max(low[axis].abs()).max(high[axis].abs());
+            }
+        }
+        Lattice::for_extent(extent, magnitude).or_coarser(self.target.options.quantization())
+    }
+
+    /// As at planes within blocks: triangles go to a quarter and the length of borders to a half.
+    fn keep_rule(&self, lattice: Lattice) -> KeepRule<'static> {
+        let hierarchy = &self.target.options.hierarchy;
+        let share = match hierarchy.borders {
+            BorderMode::Locked => 1.0,
+            BorderMode::Shared | BorderMode::Skirts => {
+                1.0 / f64::from(hierarchy.level_factor).sqrt()
+            }
+        };
+        KeepRule {
+            shares: vec![share, 1.0],
+            most: Vec::new(),
+            first_level: 0,
+            collinear: if hierarchy.borders == BorderMode::Locked { -1.0 } else { lattice.step },
+            baked: None,
+            constants: hierarchy.constants.border,
+        }
+    }
+
+    fn draft(&self, members: Vec<Tree<NodeRecord>>, lattice: Lattice) -> Result<Draft> {
+        let Target { options, out, stages, .. } = self.target;
+        let hierarchy = &options.hierarchy;
+        stages.time(Stage::Gather, || {
+            let records = members.iter().map(|tree| &tree.record);
+            let Members { mut model, skirts } = members::read(out.path(), records, lattice)?;
+            merge_untextured(&mut model);
+            // What thinned on both sides of a border of members, but not alike, had skirts.
+            let looks = Looks::new(&model, hierarchy.seams);
+            let kinds = looks.kinds(&model.parts);
+            let between = stitches(&model.parts, kinds, &hierarchy.constants.stitch);
+            let chunk = gather(&model.materials, &model.parts, &between);
+            // They are in the chunk now.
+            model.parts.iter_mut().for_each(|part| part.positions = Vec::new());
+            Ok(Draft { members, model, looks, skirts, chunk })
+        })
+    }
+
+    fn district(&self, draft: Draft, borders: &LevelBorder, lattice: Lattice) -> Result<Made> {
+        let Draft { members, model, looks, skirts, mut chunk } = draft;
+        let Target { options, out, stages, .. } = self.target;
+        stages.time(Stage::Gather, || borders.mark(&mut chunk));
+        let prefix = prefix(&members);
+        let file = format!("{prefix}.glb");
+        let made_of = made_of(&members, &chunk);
+        let report = DistrictReport { file: file.clone(), made_of };
+        let (reused_textures, warnings) = Default::default();
+        if let Some(earlier) = self.earlier
+            && let Some((record, reused_textures)) =
+                earlier.take_over_district(&file, &report.made_of, out)?
+        {
+            let trees = vec![Tree { record, children: members }];
+            return Ok(Made { trees, report: Some(report), reused_textures, warnings });
+        }
+        let Looks { textures, extrudable, .. } = looks;
+        let cache = TextureCache::new(&model, &textures, [chunk.mesh.materials.iter().copied()]);
+        let setup = BlockSetup::new(self.target, self.up, &cache, &extrudable);
+
+        let (low, high) = bounds_of(chunk.mesh.positions.iter().copied());
+        let origin = lattice.origin_near(std::array::from_fn(|i| (low[i] + high[i]) * 0.5));
+        let (chunk, _) = stages.time(Stage::Gather, || localise(chunk, origin, lattice, false));
+        let skirts = skirts.into_iter().map(|corners| {
+            corners.into_iter().map(|corner| corner - DVec3::from_array(origin)).collect()
+        });
+        let triangles = chunk.mesh.triangles.len();
+        let budget = (triangles as f64 / f64::from(options.hierarchy.level_factor)).round();
+        let budget = (budget as usize).max(1);
+        let resolutions = Resolutions::above(triangles, budget, &options.hierarchy);
+        let place = BlockPlace { prefix, origin, lattice };
+        let textures = setup.textures(&chunk.mesh, &resolutions);
+        let sink = setup.sink(&textures, &place);
+        let builder = setup.builder(&sink, resolutions, lattice);
+        let most = |of: fn(&NodeRecord) -> f64| {
+            members.iter().map(|tree| of(&tree.record)).fold(0.0, f64::max)
+        };
+        let bound = most(|record| record.geometric_error);
+        let below = Below { chunk, skirts: skirts.collect(), bound };
+        let measure = options.hierarchy.constants.measure;
+        let files = Files { out: out.path(), origin, constants: measure };
+        let made = builder.above(below, budget, |mesh| {
+            let parts = members.iter().map(|tree| FileDetail::read(&files, tree));
+            let parts = parts.collect::<Result<Vec<_>>>()?;
+            stages.time(Stage::Measure, || error_through(parts, mesh, LOOSE, measure))
+        })?;
+        let mut warnings = cache.warnings();
+        Ok(match made {
+            Ok(record) => {
+                warnings.extend(record.warnings.clone());
+                let trees = vec![Tree { record, children: members }];
+                Made { trees, report: Some(report), reused_textures, warnings }
+            }
+            Err(_) => {
+                let what = "district left out, since it would keep too little of the outline";
+                warnings.add(what, 1);
+                Made { trees: members, report: None, reused_textures, warnings }
+            }
+        })
+    }
+}
+
+fn sort(trees: &mut [Tree<NodeRecord>]) {
+    trees.sort_by(|a, b| item(&a.record).order(&item(&b.record)));
+}
+
+fn item(record: &NodeRecord) -> Item<'_> {
+    let NodeRecord { attributes, file, .. } = record;
+    Item {
+        low: attributes.bbox_min,
+        high: attributes.bbox_max,
+        triangles: attributes.triangles.into(),
+        name: file,
+    }
+}
+
+/// What the file of a district is called: by what it stands for.
+fn prefix(members: &[Tree<NodeRecord>]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for Tree { record, .. } in members {
+        hasher.update(record.file.as_bytes());
+        hasher.update(b"\n");
+    }
+    format!("district-{}", &hasher.finalize().to_hex().as_str()[..12])
+}
+
+/// A hash of all that a district is made of.
+fn made_of(members: &[Tree<NodeRecord>], chunk: &Chunk<f64>) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for Tree { record, .. } in members {
+        hasher.update(record.file.as_bytes());
+        hasher.update(&record.file_crc.to_le_bytes());
+        for error in [record.geometric_error, record.mean_error, record.p95_error] {
+            hasher.update(&error.to_le_bytes());
+        }
+    }
+    for bit in 0..chunk.path.len() as u32 {
+        let plane = chunk.path.plane(bit);
+        hasher.update(&plane.coordinate.bits().to_le_bytes());
+        for chain in &plane.chains {
+            chain.positions.as_flattened().iter().for_each(|at| {
+                hasher.update(&at.to_le_bytes());
+            });
+            hasher.update(&chain.keep);
+        }
+    }
+    hasher.update(&chunk.border.keep);
+    for planes in &chunk.border.planes {
+        hasher.update(&planes.to_le_bytes());
+    }
+    hasher.finalize().to_hex().to_string()
+}
