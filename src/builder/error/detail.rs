@@ -18,6 +18,12 @@ use crate::mesh::Mesh;
 /// largest.
 const WORST: f64 = 0.85;
 
+/// And wherever they are off by this share of the bound: they will have to be, sooner or later.
+const COARSE: f64 = 0.3;
+
+/// This share of the bound is much to be off by where it is not known what makes a bound so large.
+const MUCH: f64 = 0.1;
+
 /// A surface, how far it is off the source, and what there is of it in more detail.
 pub trait Detail: Sized {
     /// Of part of the source, and none of it twice.
@@ -62,11 +68,22 @@ pub fn error_through<D: Detail>(
     }
     // Sure to be there.
     let mut least = 0f64;
+    let mut asked = false;
     loop {
         for part in parts.iter_mut().filter(|part| part.bound.is_infinite()) {
             let (found, bound) = farthest(part, &mesh, least);
             part.bound = bound;
             least = least.max(found - part.off.bound);
+        }
+        let by_part = |part: &Part<D>| part.bound + part.off.bound;
+        let bound = parts.iter().map(by_part).fold(0.0, f64::max);
+        // The worst first: what they turn out to be may be enough for the others.
+        let worst = |bound: f64| (least * loose).max(bound * WORST);
+        let is_open =
+            |part: &Part<D>| by_part(part) > worst(bound) || part.off.bound > bound * COARSE;
+        let open: Vec<bool> = parts.iter().map(is_open).collect();
+        if bound > least * loose && refine(&mut parts, &open)? {
+            continue;
         }
         let union = Original::union(parts.iter().map(|part| Arc::clone(&part.surface)).collect());
         let of_parts =
@@ -75,21 +92,26 @@ pub fn error_through<D: Detail>(
         let way = Way::from(&mesh, &union, least);
         // What was found has what the part there may be off in it, once.
         least = least.max(way.found - 2.0 * f64::from(union.most_off()));
-        let by_part = parts.iter().map(|part| part.bound + part.off.bound);
-        let bound = by_part.fold(way.bound, f64::max);
-        if bound <= least * loose {
-            return Ok(total(&parts, &mesh, &union, bound));
+        if way.bound <= least * loose {
+            return Ok(total(&parts, &mesh, &union, bound.max(way.bound)));
         }
-        // The worst first: what they turn out to be may be enough for the others.
-        let enough = (least * loose).max(bound * WORST);
-        // Whatever part a point of the mesh is near.
-        let deciding = way.near(&parts).filter(|_| way.bound > enough);
-        let is_open = |(number, part): (usize, &Part<D>)| {
-            part.bound + part.off.bound > enough || deciding == Some(number)
+        let bound = bound.max(way.bound);
+        // What the farthest point of the mesh is near; where that was not enough, whatever is off by
+        // much, and then all.
+        let deciding = way.near(&parts).filter(|_| !std::mem::replace(&mut asked, true));
+        let open = |of: &dyn Fn(usize, &Part<D>) -> bool| -> Vec<bool> {
+            parts.iter().enumerate().map(|(number, part)| of(number, part)).collect()
         };
-        let open: Vec<bool> = parts.iter().enumerate().map(is_open).collect();
-        // Where those are known well enough, nothing is known of why the bound is so large.
-        if !refine(&mut parts, &open)? && !refine(&mut parts, &vec![true; open.len()])? {
+        let choices = [
+            open(&|number, _| deciding == Some(number)),
+            open(&|_, part| part.off.bound > bound * MUCH),
+            open(&|_, _| true),
+        ];
+        let mut refined = false;
+        for open in &choices {
+            refined = refined || refine(&mut parts, open)?;
+        }
+        if !refined {
             return Ok(total(&parts, &mesh, &union, bound));
         }
     }
