@@ -143,6 +143,8 @@ fn levels_are_tinted_where_asked_for() {
 
 #[test]
 fn a_run_goes_on_with_the_parent_of_a_node_that_is_damaged() {
+    let policy = ["--out", "r", "--policy", "lakhia", "--set", "all_siblings=1"];
+    let run = [&["out", "orbit.csv", "-q"], &LOADED[..], &policy].concat();
     for damage in DAMAGES {
         let place = Place::new(city());
         let scene = place.scene();
@@ -150,8 +152,6 @@ fn a_run_goes_on_with_the_parent_of_a_node_that_is_damaged() {
         let root = scene.nodes[inner(&scene) as usize].parent.unwrap();
         let file = node_file(&place, inner(&scene));
         (damage.apply)(&file);
-        let policy = ["--out", "r", "--policy", "lakhia", "--set", "all_siblings=1"];
-        let run = [&["out", "orbit.csv", "-q"], &LOADED[..], &policy].concat();
         let Some(done) = ran(&place, &run) else { return };
         let name = file.file_name().unwrap().to_str().unwrap().to_owned();
         done.code(INPUT).stderr(contains(&name).and(contains("went on without 1 file")));
@@ -168,9 +168,7 @@ fn a_run_goes_on_with_the_parent_of_a_node_that_is_damaged() {
     }
     // It is the damage that keeps the root there.
     let place = Place::new(city());
-    wall(&place, "orbit.csv", &["--out", "r", "--policy", "lakhia", "--set", "all_siblings=1"])
-        .unwrap()
-        .success();
+    ran(&place, &run).unwrap().success();
     assert_eq!(place.frames("r").column("nodes_level_0")[0], 0.0);
 }
 

@@ -275,7 +275,7 @@ mod tests {
         assert!((1..=4).contains(&opened), "{opened}");
         assert!(tight.mean >= 0.8 * true_error.mean && tight.mean <= 2.0 * true_error.mean);
         let (loose, less) = through(2.5, &coarse);
-        assert!(loose.bound >= tight.bound && less < opened, "{loose:?} {less} {opened}");
+        assert!(loose.bound >= tight.bound && less <= opened, "{loose:?} {less} {opened}");
     }
 
     #[test]
