@@ -97,7 +97,9 @@ pub fn built(report: &BuildReport, out: &Path) -> String {
         .filter(|stage| stage.seconds >= 0.005)
         .map(|stage| format!("{} {:.2}", stage.stage, stage.seconds))
         .collect();
-    let _ = writeln!(text, "  seconds of work: {}", stages.join(", "));
+    if !stages.is_empty() {
+        let _ = writeln!(text, "  seconds of work: {}", stages.join(", "));
+    }
     for warning in report.warnings.iter().take(SHOWN_WARNINGS) {
         let _ = writeln!(text, "  warning: {} ({} times)", warning.text, warning.count);
     }
