@@ -34,6 +34,8 @@ pub struct Simplified {
 /// Collapses edges as long as pixels of the picture move by no more than `most_error` pixels, wherever in
 /// its cell the eye is; the surface as it is where nothing can be left out.
 pub fn simplified(mesh: &ParallaxMesh, depths: &Depths<'_>, most_error: f32) -> Result<Simplified> {
+    // Points that were made for triangles which are none are of no part.
+    let mesh = &used(mesh, &mesh.triangles);
     let bytes: &[u8] = bytemuck::cast_slice(&mesh.points);
     let points = VertexDataAdapter::new(bytes, size_of::<[f32; 3]>(), 0)
         .map_err(|error| Error::Internal(format!("points of a depth mesh: {error}")))?;
@@ -155,6 +157,23 @@ mod tests {
         let (_, fewer) = of(|x, _| 200.0 / (4.0 + 0.5 * x));
         assert_eq!((fewer.mesh.triangles.len(), fewer.missed), (2, 0));
         assert!(fewer.most_error < 1e-3, "{}", fewer.most_error);
+    }
+
+    #[test]
+    fn points_of_no_triangle_go_also_where_nothing_can_be_left_out() {
+        // Islands of three pixels, which are gone when any of their edges is.
+        let is_island = |at: usize| at % WIDTH % 8 < 3 && at / WIDTH % 8 < 3;
+        let metres: Vec<f32> =
+            (0..WIDTH * WIDTH).map(|at| if is_island(at) { 20.0 } else { f32::INFINITY }).collect();
+        let depths = Depths { metres: &metres, width: WIDTH, pixel_metres: 200.0 };
+        let mut mesh = ParallaxMesh::new(&depths, APART);
+        mesh.points.insert(0, [5.5, 5.5, 10.0]);
+        mesh.triangles.as_flattened_mut().iter_mut().for_each(|point| *point += 1);
+        let found = simplified(&mesh, &depths, 100.0).unwrap();
+        assert_eq!(found.mesh.triangles.len(), mesh.triangles.len());
+        let corners = found.mesh.triangles.as_flattened();
+        let is_used = |point: usize| corners.contains(&(point as u32));
+        assert!((0..found.mesh.points.len()).all(is_used));
     }
 
     #[test]
