@@ -63,6 +63,7 @@ pub(super) fn rectangles(edges: &[Edge], rule: FillRule, least: f64, fine: f64) 
         min,
         side,
         cells: Vec::new(),
+        new: Default::default(),
         heights: Vec::new(),
         stack: Vec::new(),
     };
@@ -72,6 +73,7 @@ pub(super) fn rectangles(edges: &[Edge], rule: FillRule, least: f64, fine: f64) 
     if rule == FillRule::EvenOdd {
         grid.cells.iter_mut().for_each(|cell| cell.turns = cell.turns.rem_euclid(2));
     }
+    grid.new = SIGNS.map(|sign| NewCells::of(&grid.cells, sign));
     std::iter::from_fn(|| grid.largest(least)).take(RECTANGLES).collect()
 }
 
@@ -81,17 +83,39 @@ struct Cell {
     turns: i32,
     /// The border goes through it.
     is_border: bool,
-    /// A rectangle covers it.
-    is_covered: bool,
 }
 
 impl Cell {
     fn is_free(&self, sign: i32) -> bool {
         !self.is_border && self.turns * sign > 0
     }
+}
 
-    fn is_new(&self, sign: i32) -> bool {
-        self.is_free(sign) && !self.is_covered
+/// Ways for a border to go round: to the left and to the right.
+const SIGNS: [i32; 2] = [1, -1];
+
+/// Cells that a border goes round one way, and no rectangle covers.
+#[derive(Default)]
+struct NewCells {
+    /// By cell: all bits, or none.
+    is_new: Vec<u16>,
+    /// How many there are.
+    count: usize,
+}
+
+impl NewCells {
+    fn of(cells: &[Cell], sign: i32) -> Self {
+        let is_new = cells.iter().map(|cell| if cell.is_free(sign) { u16::MAX } else { 0 });
+        let is_new: Vec<u16> = is_new.collect();
+        let count = is_new.iter().filter(|&&cell| cell != 0).count();
+        Self { is_new, count }
+    }
+
+    fn cover(&mut self, cells: std::ops::Range<usize>) {
+        for cell in &mut self.is_new[cells] {
+            self.count -= usize::from(*cell != 0);
+            *cell = 0;
+        }
     }
 }
 
@@ -101,8 +125,10 @@ struct Grid {
     min: [f64; 2],
     side: f64,
     cells: Vec<Cell>,
-    /// By column: free cells in a row above each other.
-    heights: Vec<usize>,
+    /// By way.
+    new: [NewCells; 2],
+    /// By column: new cells in a row above each other.
+    heights: Vec<u16>,
     stack: Vec<usize>,
 }
 
@@ -148,21 +174,25 @@ impl Grid {
 
     /// The rectangle that covers most of what is free and not yet covered.
     fn largest(&mut self, least: f64) -> Option<Rectangle> {
+        let area = |cells: usize| cells as f64 * self.side * self.side;
+        let is_enough = |cells: usize| cells > 0 && area(cells) >= least;
         // A surface that looks one way is usual.
-        let mut of_sign = |sign: i32| match self.cells.iter().any(|cell| cell.is_new(sign)) {
-            true => self.largest_new(sign),
+        let [left, right] = [0, 1].map(|way| match is_enough(self.new[way].count) {
+            true => {
+                largest_new(&self.new[way].is_new, self.columns, &mut self.heights, &mut self.stack)
+            }
             false => Default::default(),
-        };
-        let (left, right) = (of_sign(1), of_sign(-1));
+        });
         let (sign, (new, columns, rows)) = if right.0 > left.0 { (-1, right) } else { (1, left) };
-        let new_area = new as f64 * self.side * self.side;
-        if new == 0 || new_area < least {
+        if !is_enough(new) {
             return None;
         }
+        let new_area = area(new);
         let (mut columns, mut rows) = (columns, rows);
         for row in rows[0]..rows[1] {
-            let covered = &mut self.row(row)[columns[0]..columns[1]];
-            covered.iter_mut().for_each(|cell| cell.is_covered = true);
+            let first = row * self.columns;
+            let covered = first + columns[0]..first + columns[1];
+            self.new.iter_mut().for_each(|new| new.cover(covered.clone()));
         }
         // It may reach into what others cover.
         let is_free =
@@ -193,40 +223,49 @@ impl Grid {
             new_area,
         })
     }
+}
 
-    /// Its cells, and its columns and rows from and to.
-    fn largest_new(&mut self, sign: i32) -> (usize, [usize; 2], [usize; 2]) {
-        let mut best = (0, [0; 2], [0; 2]);
-        self.heights.clear();
-        self.heights.resize(self.columns + 1, 0);
-        for row in 0..self.rows {
-            let cells = &self.cells[row * self.columns..(row + 1) * self.columns];
-            for (cell, height) in cells.iter().zip(&mut self.heights) {
-                *height = if cell.is_new(sign) { *height + 1 } else { 0 };
-            }
-            if self.heights.iter().all(|&height| height == 0) {
-                continue;
-            }
-            // Each rectangle ends at the first column that is lower; none is left at the last, of 0.
-            self.stack.clear();
-            for column in 0..=self.columns {
-                let height = self.heights[column];
-                while let Some(&top) = self.stack.last()
-                    && self.heights[top] >= height
-                {
-                    self.stack.pop();
-                    let from = self.stack.last().map_or(0, |&lower| lower + 1);
-                    let area = self.heights[top] * (column - from);
-                    if area > best.0 {
-                        let rows = [row + 1 - self.heights[top], row + 1];
-                        best = (area, [from, column], rows);
-                    }
-                }
-                self.stack.push(column);
-            }
+/// The largest rectangle of new cells: how many they are, and its columns and rows from and to.
+fn largest_new(
+    is_new: &[u16],
+    columns: usize,
+    heights: &mut Vec<u16>,
+    stack: &mut Vec<usize>,
+) -> (usize, [usize; 2], [usize; 2]) {
+    let mut best = (0, [0; 2], [0; 2]);
+    heights.clear();
+    heights.resize(columns + 1, 0);
+    let mut rows = is_new.chunks_exact(columns).enumerate().peekable();
+    while let Some((row, cells)) = rows.next() {
+        let mut all = 0;
+        for (cell, height) in cells.iter().zip(&mut *heights) {
+            *height = (*height + 1) & cell;
+            all += u32::from(*height);
         }
-        best
+        // What all goes on in the next row is larger there.
+        let goes_on =
+            |below: &[u16]| cells.iter().zip(below).all(|(cell, below)| cell & !below == 0);
+        if all as usize <= best.0 || rows.peek().is_some_and(|(_, below)| goes_on(below)) {
+            continue;
+        }
+        // Each rectangle ends at the first column that is lower; none is left at the last, of 0.
+        stack.clear();
+        for (column, &height) in heights.iter().enumerate() {
+            while let Some(&top) = stack.last()
+                && heights[top] >= height
+            {
+                stack.pop();
+                let from = stack.last().map_or(0, |&lower| lower + 1);
+                let area = usize::from(heights[top]) * (column - from);
+                if area > best.0 {
+                    let rows = [row + 1 - usize::from(heights[top]), row + 1];
+                    best = (area, [from, column], rows);
+                }
+            }
+            stack.push(column);
+        }
     }
+    best
 }
 
 #[cfg(test)]
