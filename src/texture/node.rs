@@ -280,12 +280,13 @@ impl<'a> NodeBuilder<'a> {
             let (sheet_images, members) = self.baked_images(first, &images, mapping);
             let cell = self.block.baked_cell(self.level);
             let sheet = Sheet { images: sheet_images, cell, max_side: self.max_side() };
-            if let Some(atlas) = sheet.build(1) {
+            let is_least = images.iter().all(|image| image.size == [1, 1]);
+            if let Some(atlas) = sheet.build(if is_least { usize::MAX } else { 1 }) {
                 let mut mappings = vec![None; first as usize];
                 mappings.resize(self.charts.boxes.len(), Some(mapping));
                 return self.take_atlas(&atlas, &mappings, &members, 3);
             }
-            if images.iter().all(|image| image.size == [1, 1]) {
+            if is_least {
                 let side = self.max_side();
                 return Err(Error::Internal(format!("no atlas of {side} texels a side")));
             }
@@ -351,7 +352,9 @@ impl<'a> NodeBuilder<'a> {
             let mappings = self.texel_mappings(&images, &levels);
             let (sheet_images, members) = self.sheet_images(&images, &levels, &mappings);
             let sheet = Sheet { images: sheet_images, cell: self.block.cell(self.level), max_side };
-            let max_pages = if is_leaf && halvings == 0 { usize::MAX } else { 1 };
+            // Many pictures may need several however small they are.
+            let is_least = levels.iter().all(|image| image.size == [1, 1]);
+            let max_pages = if is_leaf && halvings == 0 || is_least { usize::MAX } else { 1 };
             if let Some(atlas) = sheet.build(max_pages) {
                 if !is_leaf && !fitted && halvings == 0 && self.exceeds_share(&atlas) {
                     fitted = true;
@@ -361,7 +364,7 @@ impl<'a> NodeBuilder<'a> {
                 self.take_atlas(&atlas, &mappings, &members, channels)?;
                 break;
             }
-            if levels.iter().all(|image| image.size == [1, 1]) {
+            if is_least {
                 return Err(Error::Internal(format!("no atlas of {max_side} texels a side")));
             }
             coarser = levels.iter().map(|image| Cow::Owned(image.halved())).collect();
