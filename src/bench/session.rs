@@ -1,5 +1,6 @@
 //! A built scene that is open for runs.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -16,6 +17,13 @@ use crate::render::content::{TextureFormat, held_bytes, picture_bytes};
 use crate::runtime::SceneTree;
 use crate::runtime::residency::{Residency, Sizes};
 use crate::{Error, Result};
+
+/// Triangles of the surfaces that tell what hides what: some 6 MB.
+const OCCLUDER_TRIANGLES: u64 = 200_000;
+
+/// Triangles that are drawn at the start of a run to learn what things take, unless the roots have more.
+#[cfg(feature = "render")]
+const TIMED_TRIANGLES: u64 = 200_000;
 
 /// A built scene that is open for runs.
 #[derive(Clone, Debug)]
@@ -119,16 +127,20 @@ impl Session {
         policy: &dyn Policy,
         cells: Option<&Cells>,
     ) -> Result<Arc<Mutex<Residency>>> {
+        // Held for as long as the roots are.
+        let mut beside_roots: BTreeMap<u32, u64> = BTreeMap::new();
+        if policy.wants_seen_areas() {
+            for node in self.scene.coarse_front(OCCLUDER_TRIANGLES) {
+                let at = self.tree.node(node);
+                *beside_roots.entry(self.tree.root_of(node)).or_default() +=
+                    Occluders::most_bytes(at.vertices, at.triangles);
+            }
+        }
         let occlusion = |node: u32| {
             let at = self.tree.node(node);
             let hides =
                 if options.cull_hidden { NodeOcclusion::most_bytes(at.triangles) } else { 0 };
-            match at.parent {
-                None if policy.wants_seen_areas() => {
-                    hides + Occluders::most_bytes(at.vertices, at.triangles)
-                }
-                _ => hides,
-            }
+            hides + beside_roots.get(&node).copied().unwrap_or(0)
         };
         let mut sizes = self.sizes(options.textures).with_beside(occlusion);
         if let Some(cells) = cells {
@@ -148,14 +160,14 @@ impl Session {
         }
     }
 
-    /// The surfaces of the roots, for policies that ask what hides what. A file that cannot be used
-    /// hides nothing; the run tells of it.
+    /// Coarse surfaces, for policies that ask what hides what. A file that cannot be used hides nothing;
+    /// the run tells of it.
     fn occluders(&self, policy: &dyn Policy) -> Option<Arc<Occluders>> {
         let read = || {
             let mut occluders = Occluders::default();
-            for &root in self.tree.roots() {
-                if let Ok(mesh) = self.files().read_mesh(root) {
-                    occluders.add(self.tree.node(root).bbox, &mesh);
+            for node in self.scene.coarse_front(OCCLUDER_TRIANGLES) {
+                if let Ok(mesh) = self.files().read_mesh(node) {
+                    occluders.add(node, self.tree.node(node).bbox, &mesh);
                 }
             }
             Arc::new(occluders)
@@ -220,7 +232,7 @@ impl Session {
     }
 
     /// Replays a path on a graphics adapter, by the clock on the wall. Where `constants` are
-    /// given, their prices are what is expected of time at first; otherwise the roots are timed
+    /// given, their prices are what is expected of time at first; otherwise coarse nodes are timed
     /// from places on the path.
     #[cfg(feature = "render")]
     pub fn run_wall(
@@ -245,7 +257,13 @@ impl Session {
         let constants = match constants {
             Some(constants) => constants,
             None => ClockConstants {
-                prices: super::measure_start(renderer, &tree, files.clone(), path)?,
+                prices: super::measure_start(
+                    renderer,
+                    &tree,
+                    files.clone(),
+                    &self.scene.coarse_front(TIMED_TRIANGLES),
+                    path,
+                )?,
                 ..ClockConstants::default()
             },
         };

@@ -29,7 +29,7 @@ use crate::format::{BlockInfo, OutputDir};
 use crate::lattice::Lattice;
 use crate::lattice::Quantization;
 use crate::mesh::{Material, Model, Part, PositionKey, UpAxis, Warnings, key};
-use crate::report::build_report::LeftOutNode;
+use crate::report::build_report::{BlockCut, LeftOutNode};
 use crate::texture::{SharedTextures, TextureCache};
 
 /// A block whose nodes are written.
@@ -58,6 +58,8 @@ pub struct BuiltInput {
     pub used_texels: u64,
     /// Open edges between which there are stitches ([`crate::builder::stitch`]).
     pub stitched_edges: u64,
+    /// The planes that divided it, in order.
+    pub cuts: Vec<BlockCut>,
     /// What was imperfect.
     pub warnings: Warnings,
 }
@@ -155,6 +157,7 @@ pub fn build_input(
     if let Some(what) = coarse {
         warnings.add(what, 1);
     }
+    let cuts = cuts(&drafts, common);
     let shared_vertices = stages.time(Stage::Gather, || {
         let bounds: Vec<_> = drafts.iter().map(|draft| draft.source.bounds()).collect();
         let mut shared = shared_positions(&bounds, |block| drafts[block].source.uncut_positions());
@@ -226,7 +229,27 @@ pub fn build_input(
     }
     warnings.extend(cache.warnings());
     left_out.sort_by(|a, b| a.file.cmp(&b.file));
-    Ok(BuiltInput { blocks, left_out, used_texels, stitched_edges, warnings })
+    Ok(BuiltInput { blocks, left_out, used_texels, stitched_edges, cuts, warnings })
+}
+
+/// The planes that divided drafts, as their nodes have them.
+fn cuts(drafts: &[Draft], lattice: Lattice) -> Vec<BlockCut> {
+    let chunks = drafts.iter().filter_map(|draft| match &draft.source {
+        DraftSource::Chunk(chunk) => Some(chunk),
+        DraftSource::Parts(..) => None,
+    });
+    let planes =
+        chunks.flat_map(|chunk| (0..chunk.path.len() as u32).map(|bit| chunk.path.plane(bit)));
+    let mut cuts: Vec<BlockCut> = planes
+        .filter(|plane| !is_of_shared(plane))
+        .map(|plane| BlockCut {
+            axis: plane.axis,
+            coordinate: lattice.round(plane.coordinate) + 0.0,
+        })
+        .collect();
+    cuts.sort_by(|a, b| a.axis.cmp(&b.axis).then(a.coordinate.total_cmp(&b.coordinate)));
+    cuts.dedup();
+    cuts
 }
 
 /// The stitches within each plan, and the positions between which there are stitches from one plan

@@ -47,7 +47,7 @@ impl Default for BuildOptions {
             quantize: None,
             compress: false,
             textured_weight: crate::format::attributes::TEXTURED_WEIGHT,
-            districts: false,
+            districts: true,
             force: false,
         }
     }
@@ -103,8 +103,8 @@ impl BuildOptions {
         if self.compress {
             parameters["compress"] = "meshopt".into();
         }
-        if self.districts {
-            parameters["districts"] = "on".into();
+        if !self.districts {
+            parameters["districts"] = "off".into();
         }
         if self.placement != Placement::Local {
             parameters[PLACEMENT] = serde_json::json!(self.placement);

@@ -28,7 +28,7 @@ use crate::mesh::{Model, UpAxis, Warnings};
 use crate::place::placement_of;
 use crate::place::{Globe, z_up};
 use crate::report::build_report::{
-    Baked, BuildReport, Count, FileReport, InputReport, OverBudget, Quantized,
+    Baked, BlockCut, BuildReport, Count, FileReport, InputReport, OverBudget, Quantized,
     SharedTexturesReport, StageReport, UpFrom, level_reports,
 };
 use crate::texture::{BakeReason, SharedTextures};
@@ -193,6 +193,7 @@ impl Run<'_> {
             triangles,
             texels: built.used_texels,
             stitched_edges: built.stitched_edges,
+            cuts: built.cuts,
             up,
             up_from: Some(up_from),
             outcomes,
@@ -221,7 +222,10 @@ impl Run<'_> {
             match self.options.districts {
                 true => {
                     let Self { options, output, stages, progress, .. } = self;
-                    let above = Above { options, out: output, stages, progress, earlier, up };
+                    let cuts: Vec<BlockCut> =
+                        reports.iter().flat_map(|input| input.cuts.iter().copied()).collect();
+                    let above =
+                        Above { options, out: output, stages, progress, earlier, up, cuts: &cuts };
                     build_districts(trees, &mut shared_textures, &above)?
                 }
                 false => Districts { trees, ..Districts::default() },

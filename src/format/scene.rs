@@ -1,5 +1,7 @@
 //! The hierarchy of a city: a forest of nodes and what they need to be chosen, loaded and drawn.
 
+use std::collections::BinaryHeap;
+
 use crate::mesh::UpAxis;
 
 /// The contents of `scene.hlod`.
@@ -124,6 +126,31 @@ impl Scene {
         (0u32..).zip(&self.nodes).filter(move |(_, node)| is_root(node)).map(|(index, _)| index)
     }
 
+    /// Indices of nodes that stand for all of the scene: the coarsest of blocks, or where these have more
+    /// than so many triangles together, districts of the least errors for so many. In order.
+    pub fn coarse_front(&self, most_triangles: u64) -> Vec<u32> {
+        let node = |index: u32| &self.nodes[index as usize];
+        // Positive floats order as their bits do; equal errors go by index.
+        let keyed = |index: u32| (node(index).geometric_error.max(0.0).to_bits(), index);
+        let triangles = |index: u32| u64::from(node(index).triangles);
+        let mut open: BinaryHeap<(u64, u32)> = self.roots().map(keyed).collect();
+        let mut all: u64 = open.iter().map(|&(_, index)| triangles(index)).sum();
+        let mut front = Vec::new();
+        while let Some((_, index)) = open.pop() {
+            let finer: u64 = self.children(index).map(triangles).sum();
+            let after = all.saturating_sub(triangles(index)) + finer;
+            let is_district = node(index).block.is_none() && node(index).first_child.is_some();
+            if is_district && after <= most_triangles {
+                all = after;
+                open.extend(self.children(index).map(keyed));
+            } else {
+                front.push(index);
+            }
+        }
+        front.sort_unstable();
+        front
+    }
+
     /// Indices of the children of a node, from the first to the last.
     pub fn children(&self, node: u32) -> Children<'_> {
         let next = self.nodes.get(node as usize).and_then(|node| node.first_child);
@@ -170,5 +197,22 @@ impl Iterator for Children<'_> {
         self.left = self.left.checked_sub(1)?;
         self.next = self.nodes.get(index as usize)?.next_sibling;
         Some(index)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::format::test_scene;
+
+    #[test]
+    fn a_coarse_front_goes_down_to_blocks_as_far_as_there_are_triangles() {
+        let mut scene = test_scene::scene();
+        assert_eq!(scene.block_roots().collect::<Vec<_>>(), [1, 4]);
+        assert_eq!(scene.coarse_front(1800), [1, 4], "not to what is below them");
+        assert_eq!(scene.coarse_front(1_000_000), [1, 4]);
+        assert_eq!(scene.coarse_front(1799), [0, 4], "no coarser than the roots");
+        scene.nodes[1].triangles = 2000;
+        assert_eq!(scene.coarse_front(2899), [0, 4]);
+        assert_eq!(scene.coarse_front(2900), [1, 4]);
     }
 }

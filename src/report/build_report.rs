@@ -81,6 +81,9 @@ pub struct InputReport {
     /// on all levels but the leaves'.
     #[serde(default)]
     pub stitched_edges: u64,
+    /// Where planes divided it into blocks, in order: there its districts may meet.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cuts: Vec<BlockCut>,
     /// Which of its axes points at the sky.
     pub up: UpAxis,
     /// How that is known; `None` in results of versions that did not say.
@@ -93,6 +96,15 @@ pub struct InputReport {
     pub left_out: Vec<LeftOutNode>,
     /// What was imperfect in it and how often, in the order in which it was met.
     pub warnings: Vec<Count>,
+}
+
+/// A plane that divided an input into blocks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BlockCut {
+    /// The axis that it is across: 0, 1 or 2.
+    pub axis: usize,
+    /// Where it meets that axis, in source coordinates.
+    pub coordinate: f64,
 }
 
 /// A file that was read.

@@ -28,8 +28,12 @@ const POSES: usize = 6;
 const FAR: f64 = 2.0;
 /// Pixels of error for which nodes are chosen to be measured: frames long and short.
 const ERRORS_PIXELS: [f64; 4] = [64.0, 16.0, 4.0, 1.0];
-/// No more triangles than this are measured in a frame.
+/// No more triangles than this are measured in a frame, unless the adapter draws more in little time.
 const MOST_TRIANGLES: u64 = 400_000;
+/// Milliseconds that is.
+const LITTLE_MS: f64 = 50.0;
+/// And no more than this.
+const MOST_IN_LITTLE_TIME: u64 = 8_000_000;
 
 /// Milliseconds to draw nodes: at first, and in several frames after that.
 fn times(
@@ -99,25 +103,26 @@ impl Samples {
 }
 
 /// What things take at the beginning of a run, from drawing nothing (thesis, section 4.2, note 3)
-/// and those of the roots that can be read.
+/// and those of some nodes that can be read.
 pub fn measure_start(
     renderer: &mut Renderer,
     tree: &SceneTree,
     files: NodeFiles,
+    nodes: &[u32],
     path: &CameraPath,
 ) -> Result<Prices> {
     let mut measured = MeasurementScene::new(tree, files, renderer);
     // What cannot be read is told of by the run itself.
-    let roots: Vec<u32> =
-        tree.roots().iter().copied().filter(|&root| measured.add(root).is_ok()).collect();
+    let nodes: Vec<u32> =
+        nodes.iter().copied().filter(|&node| measured.add(node).is_ok()).collect();
     let mut samples = Samples::default();
     for pose in poses(path) {
         samples.measure(tree, &mut measured, &[], pose)?;
-        let seen = seen(tree, &roots, pose, measured.renderer().options().size);
+        let seen = seen(tree, &nodes, pose, measured.renderer().options().size);
         for part in [seen.len(), seen.len() / 2, seen.len() / 4] {
             samples.measure(tree, &mut measured, &seen[..part], pose)?;
         }
-        samples.measure(tree, &mut measured, &roots, &far_away(tree, pose))?;
+        samples.measure(tree, &mut measured, &nodes, &far_away(tree, pose))?;
     }
     Ok(samples.prices())
 }
@@ -196,14 +201,18 @@ pub fn calibrate(
         (Samples::default(), Samples::default(), Vec::new());
     for pose in poses(path) {
         let empty_ms = samples.measure(tree, &mut measured, &[], pose)?;
+        let mut most = MOST_TRIANGLES;
         for pixels in ERRORS_PIXELS {
             let front = choose(tree, pose, size, pixels)?;
             let nodes = || front.iter().map(|&node| tree.node(node));
-            if nodes().map(|node| u64::from(node.triangles)).sum::<u64>() > MOST_TRIANGLES {
+            let triangles: u64 = nodes().map(|node| u64::from(node.triangles)).sum();
+            if triangles > most {
                 break; // finer ones have more
             }
             measured.show(&front)?;
             let ms = samples.measure(tree, &mut measured, &front, pose)?;
+            let in_little_time = (triangles as f64 * LITTLE_MS / ms.max(0.01)) as u64;
+            most = most.max(in_little_time.min(MOST_IN_LITTLE_TIME));
             // The same triangles without their textures.
             if nodes().any(|node| node.textured_triangles > 0) {
                 measured.strip(&front)?;

@@ -32,7 +32,7 @@ pub struct BuildArgs {
     blocks: BlockMode,
     /// Nodes above the blocks, so that a view of a whole city costs the same however many blocks it
     /// has: `on`, or `off`, where the roots of all blocks are drawn at least
-    #[arg(long, value_enum, default_value_t = DistrictsArg::Off, help_heading = "Hierarchy")]
+    #[arg(long, value_enum, default_value_t = DistrictsArg::On, help_heading = "Hierarchy")]
     districts: DistrictsArg,
     /// The shape of the trees
     #[arg(long, value_enum, default_value_t = TreeArg::Balanced, help_heading = "Hierarchy")]

@@ -21,13 +21,11 @@ use crate::builder::border::shared::{Bounds, bounds_of, shared_positions};
 use crate::builder::border::span::BorderSpan;
 use crate::builder::border::vertex::{Border, Path};
 use crate::builder::cut::split::Chunk;
+use crate::builder::districts::cuts::{Cuts, PlaneKey, is_strip};
 use crate::mesh::{Mesh, PositionKey, key, wide};
 
 /// A district has at most so many planes around it; at what is beyond them nothing thins.
 const MOST_PLANES: usize = 60;
-
-/// A plane: its axis and the bits of its coordinate, which order as they are hashed.
-type PlaneKey = (usize, u64);
 
 type EdgeKey = [PositionKey<f64>; 2];
 
@@ -58,8 +56,9 @@ impl PlaneEdges {
 }
 
 impl LevelBorder {
-    /// Between the members of so many districts, of which `rule` says what is kept.
-    pub fn between(districts: &[&Mesh<f64>], rule: &KeepRule) -> Self {
+    /// Between the members of so many districts, of which `rule` says what is kept. `cuts` are the
+    /// planes that divided their blocks: axes and coordinates.
+    pub fn between(districts: &[&Mesh<f64>], cuts: &[(usize, f64)], rule: &KeepRule) -> Self {
         let bounds: Vec<Bounds> =
             districts.iter().map(|mesh| bounds_of(mesh.positions.iter().copied())).collect();
         let positions = |district: usize| districts[district].positions.iter().copied();
@@ -67,23 +66,25 @@ impl LevelBorder {
         if shared.is_empty() {
             return Self::default();
         }
-        let open: Vec<Vec<[[f64; 3]; 2]>> = districts.iter().map(|mesh| open_edges(mesh)).collect();
-        let is_shared = |end: &[f64; 3]| shared.contains(&key(*end));
-        let common = || open.iter().flatten().filter(|ends| ends.iter().all(is_shared));
+        let cuts = Cuts::new(cuts);
+        let open: Vec<Vec<[[f64; 3]; 2]>> =
+            districts.iter().map(|mesh| open_edges(mesh, &cuts)).collect();
+        let is_shared = |ends: &[[f64; 3]; 2]| ends.iter().all(|end| shared.contains(&key(*end)));
+        let common = || open.iter().flatten().filter(|ends| is_shared(ends));
         let mut edges_in: BTreeMap<PlaneKey, usize> = BTreeMap::new();
-        for plane in common().flat_map(planes_of) {
+        for plane in common().flat_map(|ends| cuts.along(ends)) {
             *edges_in.entry(plane).or_default() += 1;
         }
-        // An edge along a cut may be level by chance: the plane that others are in, too.
+        // An edge along a cut may be in another by chance: the plane that others are in, too.
         let best = |ends: &[[f64; 3]; 2]| {
-            planes_of(ends).max_by_key(|plane| (edges_in[plane], Reverse(*plane)))
+            let rank = |plane: &PlaneKey| (edges_in.get(plane), Reverse(*plane));
+            match is_shared(ends) {
+                true => cuts.along(ends).max_by_key(rank),
+                false => cuts.of(ends).max_by_key(rank),
+            }
         };
         let mut planes: BTreeMap<PlaneKey, PlaneEdges> =
             common().filter_map(best).map(|plane| (plane, PlaneEdges::default())).collect();
-        let best = |ends: &[[f64; 3]; 2]| {
-            let of_border = planes_of(ends).filter(|plane| edges_in.contains_key(plane));
-            of_border.max_by_key(|plane| (edges_in[plane], Reverse(*plane)))
-        };
         // Also those of one side alone, where the other closed up.
         let mut seen: FxHashSet<EdgeKey> = FxHashSet::default();
         let mut kept: FxHashSet<PositionKey<f64>> = FxHashSet::default();
@@ -98,7 +99,7 @@ impl LevelBorder {
                     plane.edges.push(edge);
                 }
                 // Not along a plane, though both ends are of another district too.
-                None if ends.iter().all(is_shared) => kept.extend(ends.map(key)),
+                None if is_shared(ends) => kept.extend(ends.map(key)),
                 None => {}
             }
         }
@@ -110,13 +111,16 @@ impl LevelBorder {
         kept.extend(shared.iter().filter(|position| !on_planes.contains_key(position)));
         let surfaces = surfaces(districts, &on_planes);
         let ranked = |plane: PlaneEdges, (axis, bits): PlaneKey| {
+            let coordinate = f64::from_bits(bits);
+            let rounding = 2.0 * rule.collinear.max(0.0);
             let vertex = |&position: &[f64; 3]| {
                 let at = key(position);
-                let fixed = kept.contains(&at) || on_planes[&at] > 1;
+                // A strip in the plane would not reach what is beside it by more than rounding.
+                let is_beside = (position[axis] - coordinate).abs() > rounding;
+                let fixed = is_beside || kept.contains(&at) || on_planes[&at] > 1;
                 BorderVertex { position, fixed, surface: surfaces[&at] }
             };
             let vertices: Vec<_> = plane.vertices.iter().map(vertex).collect();
-            let coordinate = f64::from_bits(bits);
             Arc::new(CutPlane::new(axis, coordinate, &vertices, &plane.edges, rule))
         };
         let planes = planes
@@ -183,13 +187,16 @@ impl Widened {
         let mut places = Vec::with_capacity(path.len());
         for bit in 0..path.len() as u32 {
             let plane = path.plane(bit);
-            let in_plane = |skirt: &&Vec<DVec3>| {
-                skirt.iter().all(|corner| corner[plane.axis] as f32 == plane.coordinate)
-            };
-            let polygons = skirts.iter().filter(in_plane);
-            let polygons: Vec<Polygon> =
-                polygons.filter_map(|skirt| Polygon::new(skirt, plane.axis)).collect();
-            let chains = plane.chains.iter().map(|chain| widened(chain, plane.axis, &polygons));
+            let polygon =
+                |skirt: &Vec<DVec3>| Polygon::new(skirt, plane.axis, plane.coordinate.into());
+            let polygons: Vec<Polygon> = skirts.iter().filter_map(polygon).collect();
+            let beside = beside_edges(&plane.chains, plane.axis, &polygons);
+            let chains = plane.chains.iter().zip(beside);
+            let chains = chains.map(|(chain, beside)| {
+                let at = |at: &DVec2| raised(*at, plane.axis, plane.coordinate);
+                let beside = beside.iter().map(|all| all.iter().map(at).collect());
+                widened(chain, beside.collect())
+            });
             let (chains, of_plane): (Vec<Chain>, Vec<Vec<u32>>) = chains.unzip();
             let plane = CutPlane::from_chains(plane.axis, plane.coordinate, chains);
             wider = wider.with(Arc::new(plane));
@@ -200,31 +207,63 @@ impl Widened {
     }
 }
 
-/// The chain with what polygons have beside its edges that they contain, and where its positions are
-/// now.
-fn widened(chain: &Chain, axis: usize, polygons: &[Polygon]) -> (Chain, Vec<u32>) {
-    let flat: Vec<DVec2> = chain.positions.iter().map(|&at| flattened(wide(at), axis)).collect();
-    // By edge, what is beside it.
-    let mut beside: Vec<Vec<DVec2>> = vec![Vec::new(); flat.len()];
+/// By chain and edge, corners of what polygons cover beside it.
+fn beside_edges(chains: &[Chain], axis: usize, polygons: &[Polygon]) -> Vec<Vec<Vec<DVec2>>> {
+    let flat: Vec<Vec<DVec2>> = chains
+        .iter()
+        .map(|chain| chain.positions.iter().map(|&at| flattened(wide(at), axis)).collect())
+        .collect();
+    let mut beside: Vec<Vec<Vec<DVec2>>> =
+        flat.iter().map(|chain| vec![Vec::new(); chain.len()]).collect();
     for polygon in polygons {
-        let contains = |&edge: &usize| polygon.contains(0.5 * (flat[edge] + flat[edge + 1]));
-        let mut first = 0;
-        while first + 1 < flat.len() {
-            let count = (first..flat.len() - 1).take_while(contains).count();
-            if count > 0 {
-                polygon.share_out(&flat[first..=first + count], &mut beside[first..first + count]);
+        let mut has_edge = false;
+        for (flat, beside) in flat.iter().zip(&mut beside) {
+            let contains = |&edge: &usize| polygon.contains(0.5 * (flat[edge] + flat[edge + 1]));
+            let mut first = 0;
+            while first + 1 < flat.len() {
+                let count = (first..flat.len() - 1).take_while(contains).count();
+                if count > 0 {
+                    has_edge = true;
+                    polygon
+                        .share_out(&flat[first..=first + count], &mut beside[first..first + count]);
+                }
+                first += count + 1;
             }
-            first += count + 1;
+        }
+        // A strip may have another one between it and the edge.
+        if !has_edge && let Some((chain, edge)) = polygon.nearest_edge(&flat) {
+            beside[chain][edge].extend(&polygon.corners);
         }
     }
+    let joints = polygons.iter().filter_map(|polygon| polygon.joint);
+    let joints: FxHashSet<[[u64; 2]; 2]> = joints.map(|joint| joint.map(bits)).collect();
+    for (flat, beside) in flat.iter().zip(&mut beside) {
+        for (ends, beside) in flat.windows(2).zip(beside) {
+            let along = ends[1] - ends[0];
+            beside.sort_by(|a, b| a.dot(along).total_cmp(&b.dot(along)));
+            // What an end beside the plane is joined with is next to it.
+            let mut joined = |end: usize| {
+                let is_joint = |at: &DVec2| joints.contains(&[ends[end], *at].map(bits));
+                beside.iter().position(is_joint).map(|place| beside.remove(place))
+            };
+            let [first, last] = [joined(0), joined(1)];
+            beside.extend(last);
+            beside.splice(0..0, first);
+        }
+    }
+    beside
+}
+
+/// The chain with what is beside its edges, and where its positions are now.
+fn widened(chain: &Chain, beside: Vec<Vec<[f32; 3]>>) -> (Chain, Vec<u32>) {
     let mut wider = Chain::default();
-    let mut places = Vec::with_capacity(flat.len());
+    let mut places = Vec::with_capacity(chain.positions.len());
     for ((&position, &keep), beside) in chain.positions.iter().zip(&chain.keep).zip(beside) {
         places.push(wider.positions.len() as u32);
         wider.positions.push(position);
         wider.keep.push(keep);
         wider.keep.extend(beside.iter().map(|_| u8::MAX));
-        wider.positions.extend(beside.iter().map(|&at| raised(at, axis, position[axis])));
+        wider.positions.extend(beside);
     }
     (wider, places)
 }
@@ -248,21 +287,42 @@ fn raised(point: DVec2, axis: usize, coordinate: f32) -> [f32; 3] {
     }
 }
 
+fn bits(point: DVec2) -> [u64; 2] {
+    point.to_array().map(f64::to_bits)
+}
+
 /// A convex polygon in a plane, counter-clockwise.
 struct Polygon {
     corners: Vec<DVec2>,
+    /// Where it has a corner beside the plane: that, and the nearest of those in the plane, to which the
+    /// border goes on from there.
+    joint: Option<[DVec2; 2]>,
 }
 
 impl Polygon {
-    /// `None` where it has no area.
-    fn new(corners: &[DVec3], axis: usize) -> Option<Self> {
-        let mut corners: Vec<DVec2> = corners.iter().map(|&at| flattened(at, axis)).collect();
+    /// `None` where a skirt is not in the plane, or has no area there.
+    fn new(skirt: &[DVec3], axis: usize, coordinate: f64) -> Option<Self> {
+        if !is_strip(&skirt.iter().map(|at| at.to_array()).collect::<Vec<_>>(), axis, coordinate) {
+            return None;
+        }
+        let mut corners: Vec<DVec2> = skirt.iter().map(|&at| flattened(at, axis)).collect();
+        let in_plane = |corner: &usize| skirt[*corner][axis] == coordinate;
+        let mut beside = (0..skirt.len()).filter(|corner| !in_plane(corner));
+        let joint = match [beside.next(), beside.next()] {
+            [Some(end), None] => {
+                let from = |corner: &usize| skirt[*corner].distance_squared(skirt[end]);
+                let next = (0..skirt.len()).filter(in_plane);
+                let next = next.min_by(|a, b| from(a).total_cmp(&from(b)));
+                next.map(|next| [corners[end], corners[next]])
+            }
+            _ => None,
+        };
         let next = |at: usize| (at + 1) % corners.len();
         let area: f64 = (0..corners.len()).map(|at| corners[at].perp_dot(corners[next(at)])).sum();
         if area < 0.0 {
             corners.reverse();
         }
-        (area != 0.0).then_some(Self { corners })
+        (area != 0.0).then_some(Self { corners, joint })
     }
 
     fn contains(&self, point: DVec2) -> bool {
@@ -270,6 +330,24 @@ impl Polygon {
             let (a, b) = (self.corners[at], self.corners[(at + 1) % self.corners.len()]);
             (b - a).perp_dot(point - a) >= 0.0
         })
+    }
+
+    /// The chain and edge that its middle is nearest to, no farther than it reaches itself.
+    fn nearest_edge(&self, chains: &[Vec<DVec2>]) -> Option<(usize, usize)> {
+        let middle = self.corners.iter().sum::<DVec2>() / self.corners.len() as f64;
+        let reach = self.corners.iter().map(|at| at.distance(middle)).fold(0.0, f64::max);
+        let edges = chains.iter().enumerate().flat_map(|(chain, points)| {
+            points.windows(2).enumerate().map(move |(edge, ends)| (chain, edge, ends))
+        });
+        let off = |ends: &[DVec2]| {
+            let along = ends[1] - ends[0];
+            let at = (middle - ends[0]).dot(along) / along.length_squared();
+            let at = if at.is_nan() { 0.0 } else { at.clamp(0.0, 1.0) };
+            middle.distance(ends[0] + along * at)
+        };
+        let nearest = edges.map(|(chain, edge, ends)| (off(ends), chain, edge));
+        let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (nearest.0 <= reach).then_some((nearest.1, nearest.2))
     }
 
     /// Divides it among the edges of a polyline, across the line from its first to its last point, and
@@ -307,32 +385,34 @@ fn clip(corners: &[DVec2], along: DVec2, least: f64) -> Vec<DVec2> {
     kept
 }
 
-/// The planes across an axis that an edge lies in.
-fn planes_of([a, b]: &[[f64; 3]; 2]) -> impl Iterator<Item = PlaneKey> {
-    let planes =
-        [0, 1, 2].map(|axis| (a[axis] == b[axis]).then(|| (axis, (a[axis] + 0.0).to_bits())));
-    planes.into_iter().flatten()
-}
-
 fn edge_key(ends: [[f64; 3]; 2]) -> EdgeKey {
     let [a, b] = ends.map(key);
     if a <= b { [a, b] } else { [b, a] }
 }
 
-/// The edges that an odd number of triangles have, in order of their ends.
-fn open_edges(mesh: &Mesh<f64>) -> Vec<[[f64; 3]; 2]> {
-    let mut count: FxHashMap<EdgeKey, (u32, [u32; 2])> = FxHashMap::default();
+/// The edges at which a surface ends, or its part beside the planes of cuts, in order of their ends. A lid
+/// closes what a cut opened: around it the border goes on, whether what is behind it is still there or
+/// not.
+fn open_edges(mesh: &Mesh<f64>, cuts: &Cuts) -> Vec<[[f64; 3]; 2]> {
+    struct Uses {
+        all: u32,
+        beside: u32,
+        ends: [u32; 2],
+    }
+    let mut uses: FxHashMap<EdgeKey, Uses> = FxHashMap::default();
     for &[a, b, c] in &mesh.triangles {
+        let corners = [a, b, c].map(|corner| mesh.positions[corner as usize]);
+        let is_beside = cuts.of(&corners).next().is_none();
         for ends in [[a, b], [b, c], [c, a]] {
             let positions = ends.map(|end| mesh.positions[end as usize]);
-            count.entry(edge_key(positions)).or_insert((0, ends)).0 += 1;
+            let uses = uses.entry(edge_key(positions)).or_insert(Uses { all: 0, beside: 0, ends });
+            uses.all += 1;
+            uses.beside += u32::from(is_beside);
         }
     }
-    let mut open: Vec<(EdgeKey, [u32; 2])> = count
-        .into_iter()
-        .filter(|(_, (uses, _))| uses % 2 == 1)
-        .map(|(edge, (_, ends))| (edge, ends))
-        .collect();
+    let is_open = |(_, uses): &(EdgeKey, Uses)| uses.all % 2 == 1 || uses.beside % 2 == 1;
+    let mut open: Vec<(EdgeKey, [u32; 2])> =
+        uses.into_iter().filter(is_open).map(|(edge, uses)| (edge, uses.ends)).collect();
     open.sort_unstable();
     open.into_iter().map(|(_, ends)| ends.map(|end| mesh.positions[end as usize])).collect()
 }
@@ -368,6 +448,7 @@ mod tests {
     use crate::lattice::Lattice;
 
     const ACROSS: usize = 17;
+    const CUTS: [(usize, f64); 2] = [(0, 16.0), (1, 16.0)];
 
     /// A hilly field of squares of 1 m.
     fn field(low: [f64; 2], height: impl Fn(f64, f64) -> f64) -> Mesh<f64> {
@@ -424,7 +505,7 @@ mod tests {
                 position[0] += 0.25;
             }
         }
-        let borders = LevelBorder::between(&meshes.each_ref(), &rule());
+        let borders = LevelBorder::between(&meshes.each_ref(), &CUTS, &rule());
         let chunks = meshes.each_ref().map(|mesh| chunk(mesh, &borders));
         let all = chunks.each_ref().map(states);
         let count = |of: BorderVertexState| all[0].values().filter(|&&state| state == of).count();
@@ -452,10 +533,86 @@ mod tests {
         assert_eq!(at([0.0, 3.0, hills(0.0, 3.0)]), BorderVertexState::Free);
     }
 
+    /// Fields that are level meet in the plane that they lie in, which divided nothing.
+    #[test]
+    fn only_planes_that_divided_the_source_are_borders() {
+        // Beside no plane across another axis.
+        let slanted = |low: [f64; 2]| {
+            let mut mesh = field(low, |_, _| 2.0);
+            mesh.positions.iter_mut().for_each(|at| at[0] += at[1] * 0.25);
+            mesh
+        };
+        let meshes = [[0.0, 0.0], [(ACROSS - 1) as f64, 0.0]].map(slanted);
+        let borders = LevelBorder::between(&meshes.each_ref(), &CUTS, &rule());
+        assert!(borders.planes.is_empty());
+        assert_eq!(borders.kept.len(), ACROSS);
+        let states = states(&chunk(&meshes[0], &borders));
+        let kept = states.values().filter(|&&state| state == BorderVertexState::Kept);
+        assert_eq!(kept.count(), ACROSS, "what is shared stays");
+    }
+
+    /// A house that a cut left open, closed by a lid in its plane: around it the border goes on, also
+    /// where nothing but the lid is left.
+    #[test]
+    fn the_border_goes_on_around_lids() {
+        let section = [[0.0, 0.0], [5.0, 0.0], [5.0, 3.0], [2.5, 5.0], [0.0, 3.0]];
+        let half = |far: f64, lid: bool, walls: bool| {
+            let mut mesh = Mesh::<f64>::default();
+            for x in [16.0, far] {
+                mesh.positions.extend(section.map(|[y, z]| [x, y, z]));
+            }
+            mesh.materials = vec![0; mesh.positions.len()];
+            for at in (0..5).filter(|_| walls) {
+                let next = (at + 1) % 5;
+                mesh.triangles.extend([[at, next, next + 5], [at, next + 5, at + 5]]);
+            }
+            if lid {
+                mesh.triangles.extend([[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+            }
+            mesh
+        };
+        let border = |lid, walls| {
+            let meshes = [half(8.0, lid, walls), half(24.0, false, true)];
+            let borders = LevelBorder::between(&meshes.each_ref(), &CUTS, &rule());
+            let [chunk, other] = meshes.each_ref().map(|mesh| chunk(mesh, &borders));
+            assert_eq!(chunk.border.keep[..5], other.border.keep[..5], "{lid} {walls}");
+            borders
+                .planes
+                .values()
+                .flat_map(|plane| plane.chains.iter())
+                .map(|chain| chain.positions.len())
+                .sum::<usize>()
+        };
+        let open = border(false, true);
+        assert!(open >= 5);
+        assert_eq!(border(true, true), open);
+        assert_eq!(border(true, false), open);
+    }
+
+    /// A strip whose end is beside the plane: what it goes on to is next to that end.
+    #[test]
+    fn ends_beside_the_plane_are_joined_with_what_was_next_to_them() {
+        let chain = Chain { positions: vec![[0.0, 0.0, 0.0], [0.25, 10.0, 0.0]], keep: vec![0, 0] };
+        let corner = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let closing = [corner(0.25, 10.0, 0.0), corner(0.0, 7.0, 1.0), corner(0.0, 0.0, 0.0)];
+        // Reaches beyond what the end is joined with.
+        let strip = [
+            corner(0.0, 0.0, 0.0),
+            corner(0.0, 7.5, 1.1),
+            corner(0.0, 7.4, 1.3),
+            corner(0.0, -0.1, 0.2),
+        ];
+        let polygons: Vec<Polygon> =
+            [&closing[..], &strip].map(|skirt| Polygon::new(skirt, 0, 0.0).unwrap()).into();
+        let beside = beside_edges(&[chain], 0, &polygons);
+        assert_eq!(beside[0][0].last(), Some(&DVec2::new(7.0, 1.0)));
+        assert!(strip.iter().all(|at| beside[0][0].contains(&flattened(*at, 0))));
+    }
+
     #[test]
     fn one_district_alone_has_no_border() {
         let mesh = field([0.0, 0.0], hills);
-        let borders = LevelBorder::between(&[&mesh], &rule());
+        let borders = LevelBorder::between(&[&mesh], &CUTS, &rule());
         assert!(chunk(&mesh, &borders).path.is_empty());
     }
 
@@ -465,7 +622,7 @@ mod tests {
         let across = (ACROSS - 1) as f64;
         let meshes =
             [[0.0, 0.0], [across, 0.0]].map(|low| field(low, |_, y| (y as i64 % 2) as f64));
-        let borders = LevelBorder::between(&meshes.each_ref(), &rule());
+        let borders = LevelBorder::between(&meshes.each_ref(), &CUTS, &rule());
         let chunk = chunk(&meshes[0], &borders);
         let lattice = Lattice { step: 1.0 / 1024.0 };
         let (chunk, _) = localise(chunk, [0.0; 3], lattice, false);

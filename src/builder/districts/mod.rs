@@ -11,6 +11,7 @@
 //! ([`detail`]). Between districts, borders thin alike on both sides ([`border`]).
 
 pub mod border;
+pub mod cuts;
 pub mod detail;
 pub mod grouping;
 pub mod members;
@@ -43,7 +44,7 @@ use crate::builder::threads::in_parallel;
 use crate::format::{OutputDir, SharedTexture};
 use crate::lattice::Lattice;
 use crate::mesh::{Coordinate, Model, UpAxis, Warnings};
-use crate::report::build_report::DistrictReport;
+use crate::report::build_report::{BlockCut, DistrictReport};
 use crate::texture::{SharedTextures, TextureCache};
 
 /// Districts are made until no more nodes than this are at the top.
@@ -82,6 +83,8 @@ pub struct Above<'a> {
     pub earlier: Option<&'a Earlier>,
     /// Which axis points at the sky.
     pub up: UpAxis,
+    /// The planes that divided the source into blocks.
+    pub cuts: &'a [BlockCut],
 }
 
 /// Builds districts above trees, which may come in any order. Shared textures, which are written, are
@@ -91,7 +94,7 @@ pub fn build_districts(
     textures: &mut BTreeMap<String, SharedTexture>,
     above: &Above,
 ) -> Result<Districts> {
-    let &Above { options, out, stages, progress, earlier, up } = above;
+    let &Above { options, out, stages, progress, earlier, up, cuts } = above;
     let mut districts = Districts::default();
     for _ in 0..MOST_LEVELS {
         if trees.len() <= MOST_ROOTS {
@@ -101,7 +104,7 @@ pub fn build_districts(
         let shared = SharedTextures::new();
         let target = Target { options, out, shared: &shared, stages, progress };
         let reused;
-        (trees, reused) = Level { up, target, earlier }.build(trees, &mut districts)?;
+        (trees, reused) = Level { up, cuts, target, earlier }.build(trees, &mut districts)?;
         if let Some(earlier) = earlier {
             earlier.link_textures(reused.keys(), out)?;
         }
@@ -121,6 +124,7 @@ pub fn build_districts(
 /// One level of districts.
 struct Level<'a> {
     up: UpAxis,
+    cuts: &'a [BlockCut],
     target: Target<'a>,
     earlier: Option<&'a Earlier>,
 }
@@ -162,7 +166,9 @@ impl Level<'_> {
         let drafts = in_parallel(taken, |_, members| self.draft(members, lattice))?;
         let rule = self.keep_rule(lattice);
         let meshes: Vec<_> = drafts.iter().map(|draft| &draft.chunk.mesh).collect();
-        let between = || LevelBorder::between(&meshes, &rule);
+        let cuts = self.cuts.iter().map(|cut| (cut.axis, lattice.round(cut.coordinate)));
+        let cuts: Vec<(usize, f64)> = cuts.collect();
+        let between = || LevelBorder::between(&meshes, &cuts, &rule);
         let borders = self.target.stages.time(Stage::Gather, between);
         let made = in_parallel(drafts, |_, draft| self.district(draft, &borders, lattice))?;
         let mut next = Vec::with_capacity(made.len());
@@ -254,9 +260,11 @@ impl Level<'_> {
             corners.into_iter().map(|corner| corner - DVec3::from_array(origin)).collect()
         });
         let triangles = chunk.mesh.triangles.len();
-        let budget = (triangles as f64 / f64::from(options.hierarchy.level_factor)).round();
-        let budget = (budget as usize).max(1);
-        let resolutions = Resolutions::above(triangles, budget, &options.hierarchy);
+        let BuildOptions { hierarchy, .. } = options;
+        let budget = (triangles as f64 / f64::from(hierarchy.level_factor)).round();
+        // As much as a root may have at most.
+        let budget = (budget as usize).clamp(1, hierarchy.desired_tris as usize);
+        let resolutions = Resolutions::above(triangles, budget, hierarchy);
         let place = BlockPlace { prefix, origin, lattice };
         let textures = setup.textures(&chunk.mesh, &resolutions);
         let sink = setup.sink(&textures, &place);
@@ -266,7 +274,7 @@ impl Level<'_> {
         };
         let bound = most(|record| record.geometric_error);
         let below = Below { chunk, skirts: skirts.collect(), bound };
-        let measure = options.hierarchy.constants.measure;
+        let measure = hierarchy.constants.measure;
         let files = Files { out: out.path(), origin, constants: measure };
         let made = builder.above(below, budget, |mesh| {
             let parts = members.iter().map(|tree| FileDetail::read(&files, tree));

@@ -10,9 +10,12 @@ use super::options::BorderMode;
 use super::outline::LeftOut;
 use super::{BlockBuilder, source_of};
 use crate::Result;
+use crate::builder::border::chain::CutPlane;
 use crate::builder::border::span::original_spans;
+use crate::builder::border::vertex::Path;
 use crate::builder::cut::split::Chunk;
 use crate::builder::districts::border::Widened;
+use crate::builder::districts::cuts::is_in_plane;
 use crate::builder::error::{Original, SurfaceError};
 use crate::builder::stages::Stage;
 use crate::mesh::Mesh;
@@ -43,7 +46,14 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let original = self.stages.time(Stage::Measure, of_mesh);
         mesh.triangles.append(&mut stitches);
         let spans = match self.options.borders {
-            BorderMode::Skirts => original_spans(&mesh, &border, &path),
+            // Around lids that close what cuts opened the border goes on.
+            BorderMode::Skirts => {
+                let mut spans = original_spans(&mesh, &border, &path);
+                spans.extend(original_spans(&beside_cuts(&mesh, &path), &border, &path));
+                spans.sort_unstable();
+                spans.dedup();
+                spans
+            }
             BorderMode::Locked | BorderMode::Shared => Vec::new(),
         };
         let Widened { path, spans } = Widened::by(&skirts, &path, spans);
@@ -56,4 +66,17 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             Outcome::LeftOut(left_out) => Err(left_out),
         })
     }
+}
+
+/// A mesh without its triangles in the planes of cuts.
+fn beside_cuts(mesh: &Mesh, path: &Path) -> Mesh {
+    let is_in = |plane: &CutPlane, corners: &[u32; 3]| {
+        let corners = corners.map(|corner| mesh.positions[corner as usize].map(f64::from));
+        is_in_plane(&corners, plane.axis, plane.coordinate.into())
+    };
+    let mut beside = mesh.clone();
+    for bit in 0..path.len() as u32 {
+        beside.triangles.retain(|corners| !is_in(path.plane(bit), corners));
+    }
+    beside
 }

@@ -1,9 +1,11 @@
 //! Coarse geometry that hides what is behind it.
 
 use glam::{DVec3, Vec3};
+use rustc_hash::FxHashSet;
 
 use crate::format::NodeMesh;
 use crate::mesh::AlphaMode;
+use crate::runtime::SceneTree;
 
 /// The opaque surface of a node.
 #[derive(Clone, Debug)]
@@ -20,6 +22,7 @@ pub(super) struct Occluder {
 #[derive(Clone, Debug, Default)]
 pub struct Occluders {
     pub(super) surfaces: Vec<Occluder>,
+    pub(super) nodes: FxHashSet<u32>,
 }
 
 impl Occluders {
@@ -30,8 +33,17 @@ impl Occluders {
         size_of::<Occluder>() as u64 + points + corners
     }
 
+    /// The one of the nodes that stands for a node, or is it; a root where none does.
+    pub(super) fn standing_for(&self, tree: &SceneTree, mut node: u32) -> u32 {
+        while !self.nodes.contains(&node) {
+            let Some(parent) = tree.node(node).parent else { break };
+            node = parent;
+        }
+        node
+    }
+
     /// Adds what of a node is opaque, and within the box `bbox`.
-    pub fn add(&mut self, bbox: [DVec3; 2], mesh: &NodeMesh) {
+    pub fn add(&mut self, node: u32, bbox: [DVec3; 2], mesh: &NodeMesh) {
         let is_opaque = |alpha: &AlphaMode| matches!(alpha, AlphaMode::Opaque);
         let opaque = || mesh.primitives.iter().filter(|at| is_opaque(&at.surface.alpha));
         let mut positions = Vec::with_capacity(opaque().map(|at| at.positions.len()).sum());
@@ -43,6 +55,7 @@ impl Occluders {
             triangles.extend(triples.iter().map(|triple: &[u32; 3]| triple.map(|at| first + at)));
         }
         let origin = DVec3::from(mesh.origin);
+        self.nodes.insert(node);
         self.surfaces.push(Occluder { bbox, origin, positions, triangles });
     }
 }

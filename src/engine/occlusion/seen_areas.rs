@@ -131,8 +131,9 @@ impl SeenAreas {
         let Known { view, points } = self.known.as_ref()?;
         let [min, max] = tree.node(node).bbox;
         let rectangle = view.frustum.rectangle([min, max])?;
-        // The surface of the root may be off by its error.
-        let reach = 2.0 * tree.node(tree.root_of(node)).mean_error;
+        // The surface that is drawn for it may be off by its error.
+        let drawn = self.occluders.standing_for(tree, node);
+        let reach = 2.0 * tree.node(drawn).mean_error;
         let eye = view.pose.position;
         let inside = [(min - reach - eye).as_vec3(), (max + reach - eye).as_vec3()];
         let [columns, rows] = pixels(rectangle);
@@ -193,7 +194,7 @@ mod tests {
     }
 
     fn areas(surfaces: Vec<Occluder>) -> SeenAreas {
-        SeenAreas::new(Arc::new(Occluders { surfaces }), 1e-3)
+        SeenAreas::new(Arc::new(Occluders { surfaces, ..Occluders::default() }), 1e-3)
     }
 
     /// The parts of what is under the boxes of two cubes, 2 m wide at 11.3 and 21.3 m, that are seen.

@@ -48,9 +48,9 @@ pub(in crate::engine) fn test_wall(distance: f32) -> Arc<NodeOcclusion> {
 /// What is seen of nodes behind and in squares across x, each about a point and so wide.
 pub(in crate::engine) fn seen_past(view: &View, squares: &[([f32; 3], f32)]) -> SeenAreas {
     let mut occluders = Occluders::default();
-    for &(middle, width) in squares {
+    for (node, &(middle, width)) in (0..).zip(squares) {
         let [min, max] = [-0.5, 0.5].map(|part| Vec3::from(middle) + part * width);
-        occluders.add([min, max].map(Vec3::as_dvec3), &square(middle, width));
+        occluders.add(node, [min, max].map(Vec3::as_dvec3), &square(middle, width));
     }
     let mut seen = SeenAreas::new(Arc::new(occluders), 0.1);
     seen.look(view, 0.0);

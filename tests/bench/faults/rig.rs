@@ -117,7 +117,7 @@ impl Ground {
         let mut wall = DVec3::ZERO;
         for &root in session.tree().roots() {
             let mesh = session.files().read_mesh(root).unwrap();
-            occluders.add(session.tree().node(root).bbox, &mesh);
+            occluders.add(root, session.tree().node(root).bbox, &mesh);
             let corners = mesh.primitives[0].positions.iter().take(3);
             let corners =
                 corners.map(|&at| DVec3::from(mesh.origin) + DVec3::from(at.map(f64::from)));
