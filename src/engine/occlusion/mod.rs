@@ -1,7 +1,7 @@
 //! What hides what, found on the processor.
 //!
 //! Two answers to two questions. How much of a node is seen, which need only be about right, is found
-//! from the surfaces of the roots in a small picture of depths ([`SeenAreas`]). Which nodes need not
+//! from coarse surfaces in a small picture of depths ([`SeenAreas`]). Which nodes need not
 //! be drawn, of which no pixel may be wrong, is found from flat pieces of what is drawn
 //! ([`HiddenNodes`]).
 
