@@ -15,6 +15,7 @@ pub mod cuts;
 pub mod detail;
 pub mod grouping;
 pub mod members;
+pub mod widened;
 
 use std::collections::BTreeMap;
 
