@@ -1,10 +1,10 @@
-//! Brings nodes from files into memory: [`NodeFiles`] reads and decodes them, [`LoadingThread`]
-//! does so beside the thread that draws, in the order that
+//! Brings nodes from files into memory: [`NodeFiles`] reads and decodes them, [`LoadingThreads`]
+//! do so beside the thread that draws, in the order that
 //! [`Residency`](crate::runtime::residency::Residency) asks for.
 
 mod background;
 mod node_files;
-mod thread;
+mod threads;
 
 pub use node_files::{Arrival, NodeFiles, Reading};
-pub use thread::{LoadingThread, PauseGuard};
+pub use threads::{LoadingThreads, PauseGuard};

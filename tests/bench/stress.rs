@@ -1,13 +1,14 @@
-//! The loading thread over a scene on disk, under priorities that jump about and caps of a few
+//! Loading threads over a scene on disk, under priorities that jump about and caps of a few
 //! nodes. After every frame all that is promised is checked; a watchdog ends what hangs.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZero;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use hlod::bench::Session;
-use hlod::loading::{Arrival, LoadingThread};
+use hlod::loading::{Arrival, LoadingThreads};
 use hlod::runtime::SceneTree;
 use hlod::runtime::residency::{Counters, NodeState, Residency, ResidencyOptions, Sizes};
 
@@ -16,6 +17,8 @@ use crate::support::Random;
 
 /// Far more than anything here takes.
 const PATIENCE: Duration = Duration::from_secs(120);
+
+const THREADS: NonZero<usize> = NonZero::new(3).unwrap();
 
 /// Runs something and fails where it does not end.
 pub fn watched<T: Send + 'static>(what: &str, run: impl FnOnce() -> T + Send + 'static) -> T {
@@ -38,7 +41,7 @@ pub struct Rig {
     pub tree: SceneTree,
     pub sizes: Sizes,
     pub residency: Arc<Mutex<Residency>>,
-    pub thread: LoadingThread,
+    pub threads: LoadingThreads,
     pub errors: Vec<String>,
     cap: u64,
     /// The highest cap that there was.
@@ -50,7 +53,7 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Roots loaded, the thread started. The cap is what the roots need and `nodes` nodes of the
+    /// Roots loaded, the threads started. The cap is what the roots need and `nodes` nodes of the
     /// largest more; `None` is all the memory there is.
     pub fn new(session: &Session, nodes: Option<u64>, options: ResidencyOptions) -> Self {
         let files = session.files();
@@ -92,12 +95,12 @@ impl Rig {
                 }
             }
         }
-        let thread = LoadingThread::start(files, Arc::clone(&residency)).unwrap();
+        let threads = LoadingThreads::start(&files, &residency, THREADS).unwrap();
         Self {
             tree: session.tree().clone(),
             sizes,
             residency,
-            thread,
+            threads,
             errors,
             cap,
             most: cap,
@@ -114,7 +117,7 @@ impl Rig {
         // A node that was dropped may already have been loaded again.
         let mut dropped: BTreeSet<u32> = changes.dropped.iter().copied().collect();
         dropped.retain(|node| self.arrived.remove(node).is_none());
-        for arrival in self.thread.arrivals() {
+        for arrival in self.threads.arrivals() {
             match arrival {
                 Ok(arrival) if dropped.remove(&arrival.node) => {}
                 Ok(arrival) => drop(self.arrived.insert(arrival.node, arrival)),
@@ -151,7 +154,7 @@ impl Rig {
         }
         residency.set_priorities(&visited, &[]);
         drop(residency);
-        self.thread.wake();
+        self.threads.wake();
     }
 
     /// Another cap, of which the least is what the roots need; whether it was lowered.
@@ -238,7 +241,7 @@ fn storm(session: &Session, nodes: Option<u64>, chunk_bytes: u64, seed: u64) -> 
     let counters = rig.residency.lock().unwrap().counters();
     let residency = Arc::clone(&rig.residency);
     drop(rig);
-    // The thread has ended: nobody else holds it any more.
+    // The threads have ended: nobody else holds it any more.
     assert_eq!(Arc::strong_count(&residency), 1);
     counters
 }
@@ -335,7 +338,7 @@ fn everything_arrives_where_there_is_room() {
 }
 
 #[test]
-fn a_thread_that_is_dropped_amid_a_load_ends() {
+fn threads_that_are_dropped_amid_loads_end() {
     let session = Session::open(city()).unwrap();
     for frames in [0, 1, 3] {
         let session = session.clone();

@@ -1,4 +1,4 @@
-//! The real backend: a loading thread, a graphics adapter, and time as it passes.
+//! The real backend: loading threads, a graphics adapter, and time as it passes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::{Snapshots, process};
 use crate::camera::View;
 use crate::engine::{Backend, Drawn, Inspect, NodeOcclusion, lock};
-use crate::loading::{Arrival, LoadingThread, NodeFiles};
+use crate::loading::{Arrival, LoadingThreads, NodeFiles};
 use crate::render::Renderer;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::{Changes, Residency};
@@ -22,7 +22,7 @@ pub struct GpuBackend<'a> {
     tree: &'a SceneTree,
     files: NodeFiles,
     renderer: &'a mut Renderer,
-    thread: Option<LoadingThread>,
+    threads: Option<LoadingThreads>,
     residency: Arc<Mutex<Residency>>,
     /// Decoded, and not yet resident.
     arrived: BTreeMap<u32, Arrival>,
@@ -52,7 +52,7 @@ impl<'a> GpuBackend<'a> {
             tree,
             files,
             renderer,
-            thread: None,
+            threads: None,
             residency,
             arrived: BTreeMap::new(),
             occlusions: BTreeMap::new(),
@@ -69,14 +69,14 @@ impl<'a> GpuBackend<'a> {
         &self.broken
     }
 
-    /// Takes what the loading thread delivered, without what was given up since; fails where it
+    /// Takes what the loading threads delivered, without what was given up since; fails where one
     /// will deliver no more.
     fn receive(&mut self, dropped: &[u32]) -> Result<()> {
-        let alive = self.thread.as_ref().map_or(Ok(()), LoadingThread::check);
+        let alive = self.threads.as_ref().map_or(Ok(()), LoadingThreads::check);
         // A node that was given up may already have been loaded again: its first arrival is dropped.
         let mut dropped: BTreeSet<u32> = dropped.iter().copied().collect();
         dropped.retain(|node| self.arrived.remove(node).is_none());
-        for arrival in self.thread.iter().flat_map(LoadingThread::arrivals) {
+        for arrival in self.threads.iter().flat_map(LoadingThreads::arrivals) {
             match arrival {
                 Ok(arrival) if dropped.remove(&arrival.node) => {}
                 Ok(arrival) => {
@@ -123,8 +123,8 @@ impl Backend for GpuBackend<'_> {
                 }
             }
         }
-        let thread = LoadingThread::start(self.files.clone(), Arc::clone(&self.residency))?;
-        self.thread = Some(thread);
+        let count = LoadingThreads::default_count();
+        self.threads = Some(LoadingThreads::start(&self.files, &self.residency, count)?);
         Ok(())
     }
 
@@ -164,8 +164,8 @@ impl Backend for GpuBackend<'_> {
     }
 
     fn priorities_set(&mut self) {
-        if let Some(thread) = &self.thread {
-            thread.wake();
+        if let Some(threads) = &self.threads {
+            threads.wake();
         }
     }
 
@@ -185,7 +185,7 @@ impl Backend for GpuBackend<'_> {
     }
 
     fn pause_for(&mut self, front: &[u32], view: &View, inspect: &mut Inspect<'_>) -> Result<()> {
-        let guard = self.thread.as_ref().map(LoadingThread::pause).transpose()?;
+        let guard = self.threads.as_ref().map(LoadingThreads::pause).transpose()?;
         inspect(Some(self.renderer.surface()?))?;
         for _ in 0..WARM_UP {
             self.renderer.draw(front, &view.pose, self.near)?;

@@ -100,6 +100,7 @@ impl Residency {
             dropped: Vec::new(),
             orphans: Vec::new(),
             loading: Vec::new(),
+            taken_up: Vec::new(),
             current: None,
             resident: 0,
             requested_bytes: 0,
@@ -215,14 +216,28 @@ impl Residency {
         }
     }
 
-    /// What to read now: a chunk of the most important node that is not in memory and for
-    /// which there is room or can be made. `None` where there is nothing to do until something
+    /// Leaves a node to whoever reads and decodes it: until it is [put down](Self::put_down), nobody
+    /// else is told to.
+    pub fn take_up(&mut self, node: u32) {
+        self.taken_up.push(node);
+    }
+
+    /// Its chunk was read, or all of it was decoded.
+    pub fn put_down(&mut self, node: u32) {
+        self.taken_up.retain(|&other| other != node);
+    }
+
+    /// What to read now: a chunk of the most important node that is not in memory, that nobody has
+    /// [taken up](Self::take_up), and for which there is room or can be made. `None` where there is nothing to do until something
     /// changes.
     pub fn next_step(&mut self) -> Option<Step> {
         let mut at = self.list.first_unloaded();
         let mut reservations = Reservations::default();
         while let Some(node) = at {
             at = self.list.after(node);
+            if self.taken_up.contains(&node) {
+                continue;
+            }
             let state = self.nodes[node as usize].state;
             match state {
                 NodeState::Absent if self.nodes[node as usize].visited != self.frame => {
@@ -287,7 +302,8 @@ impl Residency {
         let NodeState::Loading { read } = self.nodes[node as usize].state else {
             return Step { node, from: 0, bytes: 0 };
         };
-        if let Some(other) = self.current.filter(|&other| other != node) {
+        let others = self.current.filter(|other| *other != node && !self.taken_up.contains(other));
+        if let Some(other) = others {
             let suspended = matches!(self.nodes[other as usize].state, NodeState::Loading { .. });
             self.counters.suspensions += u64::from(suspended);
         }

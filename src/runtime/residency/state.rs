@@ -119,6 +119,8 @@ pub struct Residency {
     pub(super) orphans: Vec<u32>,
     /// Being read or suspended.
     pub(super) loading: Vec<u32>,
+    /// Nodes of which a chunk is being read, or which are being decoded.
+    pub(super) taken_up: Vec<u32>,
     /// The load that was given the last chunk.
     pub(super) current: Option<u32>,
     pub(super) resident: usize,

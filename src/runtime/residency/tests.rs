@@ -127,6 +127,25 @@ fn a_load_is_suspended_for_a_more_important_one_and_resumed() {
 }
 
 #[test]
+fn what_somebody_reads_or_decodes_is_left_to_them() {
+    let tree = two_levels();
+    let sizes = sizes(tree.len());
+    let mut residency = started(&tree, sizes, options(1 << 20));
+    residency.set_priorities(&[(0, 9.0), (1, 2.0), (4, 1.0)], &[]);
+    let first = residency.next_step().unwrap();
+    residency.take_up(first.node);
+    let second = residency.next_step().unwrap();
+    assert_eq!((first.node, second.node), (1, 4));
+    residency.take_up(second.node);
+    assert_eq!(residency.next_step(), None);
+    assert_eq!(residency.counters().suspensions, 0, "both go on");
+    residency.chunk_read(first.node, first.bytes);
+    residency.put_down(first.node);
+    let Step { node, from, .. } = residency.next_step().unwrap();
+    assert_eq!((node, from), (1, first.bytes));
+}
+
+#[test]
 fn what_is_no_longer_visited_is_not_loaded() {
     let tree = two_levels();
     let mut residency = started(&tree, sizes(7), options(1 << 20));

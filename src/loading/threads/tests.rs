@@ -40,9 +40,27 @@ fn faulty_guarded(files: &NodeFiles, reading: Reading) -> Result<Arrival> {
     guarded(reading.path().to_owned(), || faulty(files, reading))
 }
 
-/// A root, resident, with three children that are not, and a thread that loads them; their files
+/// Does not return before another thread decodes as well.
+fn together(files: &NodeFiles, reading: Reading) -> Result<Arrival> {
+    static MET: Mutex<usize> = Mutex::new(0);
+    static COME: Condvar = Condvar::new();
+    let mut met = MET.lock().unwrap();
+    *met += 1;
+    COME.notify_all();
+    let (met, _) = COME.wait_timeout_while(met, PATIENCE / 2, |met| *met < 2).unwrap();
+    if *met < 2 {
+        return Err(Error::Internal("nobody came".into()));
+    }
+    nothing(files, reading)
+}
+
+fn threads(count: usize) -> NonZero<usize> {
+    NonZero::new(count).unwrap()
+}
+
+/// A root, resident, with three children that are not, and threads that load them; their files
 /// are there as long as the folder.
-fn rig(decode: Decode) -> (tempfile::TempDir, Arc<Mutex<Residency>>, LoadingThread) {
+fn rig(count: usize, decode: Decode) -> (tempfile::TempDir, Arc<Mutex<Residency>>, LoadingThreads) {
     let leaf = || sketch([0.0; 3], 1.0, vec![]);
     let scene = Arc::new(scene(vec![sketch([0.0; 3], 1.0, vec![leaf(), leaf(), leaf()])]));
     let folder = tempfile::tempdir().unwrap();
@@ -59,37 +77,38 @@ fn rig(decode: Decode) -> (tempfile::TempDir, Arc<Mutex<Residency>>, LoadingThre
     residency.loaded(0);
     let residency = Arc::new(Mutex::new(residency));
     let files = NodeFiles::new(folder.path(), Arc::clone(&scene));
-    let thread = LoadingThread::start_with(files, Arc::clone(&residency), decode).unwrap();
-    (folder, residency, thread)
+    let threads = LoadingThreads::start_with(&files, &residency, threads(count), decode).unwrap();
+    (folder, residency, threads)
 }
 
 /// Loads until `done` says so; the states, and the errors.
 fn load(
+    count: usize,
     decode: Decode,
-    done: impl Fn(&LoadingThread, &Residency) -> bool,
+    done: impl Fn(&LoadingThreads, &Residency) -> bool,
 ) -> (Vec<NodeState>, Vec<String>, Result<()>) {
-    let (_folder, residency, thread) = rig(decode);
+    let (_folder, residency, threads) = rig(count, decode);
     let mut errors = Vec::new();
     let start = Instant::now();
     loop {
         let mut residency = residency.lock().unwrap();
         residency.begin_frame(FRAME_S);
         residency.set_priorities(&[(0, 9.0), (1, 3.0), (2, 2.0), (3, 1.0)], &[]);
-        if done(&thread, &residency) || start.elapsed() > PATIENCE {
-            errors.extend(thread.arrivals().filter_map(Result::err).map(|e| e.to_string()));
+        if done(&threads, &residency) || start.elapsed() > PATIENCE {
+            errors.extend(threads.arrivals().filter_map(Result::err).map(|e| e.to_string()));
             let states = (0..4).map(|node| residency.state(node)).collect();
-            return (states, errors, thread.check());
+            return (states, errors, threads.check());
         }
         drop(residency);
-        errors.extend(thread.arrivals().filter_map(Result::err).map(|e| e.to_string()));
-        thread.wake();
+        errors.extend(threads.arrivals().filter_map(Result::err).map(|e| e.to_string()));
+        threads.wake();
         std::thread::sleep(Duration::from_micros(200));
     }
 }
 
 #[test]
 fn a_node_over_which_decoding_panics_is_told_of_once_and_the_others_arrive() {
-    let (states, errors, alive) = load(faulty_guarded, |_, residency| {
+    let (states, errors, alive) = load(1, faulty_guarded, |_, residency| {
         residency.resident() == 3 && residency.state(FAULTY) == NodeState::Broken
     });
     use NodeState::{Broken, Resident};
@@ -100,35 +119,42 @@ fn a_node_over_which_decoding_panics_is_told_of_once_and_the_others_arrive() {
 }
 
 #[test]
-fn a_thread_that_died_is_an_error() {
-    let (_, errors, alive) = load(faulty, |thread, _| thread.check().is_err());
+fn a_node_that_is_slow_to_decode_holds_up_no_other() {
+    let (states, errors, _) = load(2, together, |_, residency| residency.resident() == 4);
+    assert_eq!(errors, Vec::<String>::new());
+    assert_eq!(states, [NodeState::Resident; 4]);
+}
+
+#[test]
+fn threads_one_of_which_died_are_an_error() {
+    let (_, errors, alive) = load(2, faulty, |threads, _| threads.check().is_err());
     assert_eq!(errors, Vec::<String>::new());
     let error = alive.unwrap_err();
     assert!(error.to_string().contains("loading thread died"), "{error}");
     assert_eq!(error.exit_code(), 1);
-    let (states, _, alive) = load(nothing, |_, residency| residency.resident() == 4);
+    let (states, _, alive) = load(2, nothing, |_, residency| residency.resident() == 4);
     assert_eq!(states, [NodeState::Resident; 4]);
     alive.unwrap();
 }
 
 #[test]
-fn nothing_is_loaded_while_the_thread_stands_still_and_all_of_it_afterwards() {
-    let (_folder, residency, thread) = rig(nothing);
+fn nothing_is_loaded_while_threads_stand_still_and_all_of_it_afterwards() {
+    let (_folder, residency, threads) = rig(3, nothing);
     let ask = || {
         let mut residency = residency.lock().unwrap();
         residency.begin_frame(FRAME_S);
         residency.set_priorities(&[(0, 9.0), (1, 3.0), (2, 2.0), (3, 1.0)], &[]);
         drop(residency);
-        thread.wake();
+        threads.wake();
     };
     let known = || {
         let residency = residency.lock().unwrap();
         (residency.counters().read_bytes, residency.resident())
     };
-    let guard = thread.pause().unwrap();
+    let guard = threads.pause().unwrap();
     ask();
     let before = known();
-    thread.wake();
+    threads.wake();
     std::thread::sleep(2 * LONGEST_SLEEP);
     assert_eq!(known(), before);
     drop(guard);
@@ -139,5 +165,5 @@ fn nothing_is_loaded_while_the_thread_stands_still_and_all_of_it_afterwards() {
     }
     assert!(known().0 > before.0 && known().1 == 4);
     // Standing still waits for what is under way, and not for ever.
-    drop(thread.pause().unwrap());
+    drop(threads.pause().unwrap());
 }
