@@ -1,6 +1,6 @@
 //! A built scene that is open for runs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -130,7 +130,7 @@ impl Session {
         // Held for as long as the roots are.
         let mut beside_roots: BTreeMap<u32, u64> = BTreeMap::new();
         if policy.wants_seen_areas() {
-            for node in self.scene.coarse_front(OCCLUDER_TRIANGLES) {
+            for node in self.occluding_nodes() {
                 let at = self.tree.node(node);
                 *beside_roots.entry(self.tree.root_of(node)).or_default() +=
                     Occluders::most_bytes(at.vertices, at.triangles);
@@ -160,12 +160,19 @@ impl Session {
         }
     }
 
+    /// Nodes whose surfaces tell what is seen: a coarse front, and all above it.
+    fn occluding_nodes(&self) -> BTreeSet<u32> {
+        let front = self.scene.coarse_front(OCCLUDER_TRIANGLES);
+        let above = |&node: &u32| self.tree.node(node).parent;
+        front.into_iter().flat_map(|node| std::iter::successors(Some(node), above)).collect()
+    }
+
     /// Coarse surfaces, for policies that ask what hides what. A file that cannot be used hides nothing;
     /// the run tells of it.
     fn occluders(&self, policy: &dyn Policy) -> Option<Arc<Occluders>> {
         let read = || {
             let mut occluders = Occluders::default();
-            for node in self.scene.coarse_front(OCCLUDER_TRIANGLES) {
+            for node in self.occluding_nodes() {
                 if let Ok(mesh) = self.files().read_mesh(node) {
                     occluders.add(node, self.tree.node(node).bbox, &mesh);
                 }

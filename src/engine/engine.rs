@@ -98,7 +98,7 @@ pub struct Engine<'a> {
 
 /// Locks; a thread that died while it held the lock is an error of ours.
 pub fn lock(residency: &Mutex<Residency>) -> Result<MutexGuard<'_, Residency>> {
-    residency.lock().map_err(|_| Error::Internal("the loading thread died".into()))
+    residency.lock().map_err(|_| Error::Internal("a loading thread died".into()))
 }
 
 impl<'a> Engine<'a> {
@@ -210,9 +210,9 @@ impl<'a> Engine<'a> {
         seen.steady.follow(&self.costs, self.margin.ratio(), &self.load, is_still);
 
         let before = self.backend.now_ms();
-        let dt_s = self.seen.dt_s;
+        let Seen { tree, dt_s, .. } = self.seen;
         if let Some(seen) = &mut self.seen.seen {
-            seen.look(&view.within(None), dt_s);
+            seen.look(tree, &view.within(None), dt_s);
         }
         if let Some(hidden) = &mut self.seen.hidden {
             hidden.begin_frame(view, dt_s);

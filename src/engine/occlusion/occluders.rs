@@ -1,8 +1,9 @@
 //! Coarse geometry that hides what is behind it.
 
 use glam::{DVec3, Vec3};
-use rustc_hash::FxHashSet;
+use rustc_hash::FxHashMap;
 
+use crate::camera::View;
 use crate::format::NodeMesh;
 use crate::mesh::AlphaMode;
 use crate::runtime::SceneTree;
@@ -18,11 +19,12 @@ pub(super) struct Occluder {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// The opaque surfaces of some nodes, in memory for as long as a scene is.
+/// The opaque surfaces of the coarsest nodes, in memory for as long as a scene is.
 #[derive(Clone, Debug, Default)]
 pub struct Occluders {
     pub(super) surfaces: Vec<Occluder>,
-    pub(super) nodes: FxHashSet<u32>,
+    /// By node: its place among these.
+    pub(super) of: FxHashMap<u32, u32>,
 }
 
 impl Occluders {
@@ -33,13 +35,34 @@ impl Occluders {
         size_of::<Occluder>() as u64 + points + corners
     }
 
-    /// The one of the nodes that stands for a node, or is it; a root where none does.
-    pub(super) fn standing_for(&self, tree: &SceneTree, mut node: u32) -> u32 {
-        while !self.nodes.contains(&node) {
-            let Some(parent) = tree.node(node).parent else { break };
-            node = parent;
+    /// The surface of a node, where there is one.
+    pub(super) fn get(&self, node: u32) -> Option<&Occluder> {
+        self.of.get(&node).map(|&at| &self.surfaces[at as usize])
+    }
+
+    /// The nodes in a view that stand for all that is there, of which `is_fine` says that none finer
+    /// need do so, as far as there are surfaces.
+    pub(super) fn front(
+        &self,
+        tree: &SceneTree,
+        view: &View,
+        is_fine: impl Fn(u32) -> bool,
+    ) -> Vec<u32> {
+        let mut open: Vec<u32> = tree.roots().to_vec();
+        let mut front = Vec::new();
+        while let Some(node) = open.pop() {
+            let Some(surface) = self.get(node) else { continue };
+            let children = tree.children(node);
+            if view.frustum.outside(surface.bbox) > 0.0 {
+                continue;
+            }
+            let can_be_finer = children.iter().any(|child| self.of.contains_key(child));
+            match can_be_finer && !is_fine(node) {
+                true => open.extend(children),
+                false => front.push(node),
+            }
         }
-        node
+        front
     }
 
     /// Adds what of a node is opaque, and within the box `bbox`.
@@ -55,7 +78,7 @@ impl Occluders {
             triangles.extend(triples.iter().map(|triple: &[u32; 3]| triple.map(|at| first + at)));
         }
         let origin = DVec3::from(mesh.origin);
-        self.nodes.insert(node);
+        self.of.insert(node, self.surfaces.len() as u32);
         self.surfaces.push(Occluder { bbox, origin, positions, triangles });
     }
 }

@@ -9,6 +9,7 @@ use crate::camera::View;
 use crate::format::{NodeMesh, Primitive, Surface};
 use crate::mesh::{AlphaMode, UpAxis, Wrap};
 use crate::random::Random;
+use crate::runtime::test_tree::{sketch, tree};
 
 /// Opaque triangles without textures, drawn from either side.
 pub(super) fn mesh(triangles: &[[[f32; 3]; 3]]) -> NodeMesh {
@@ -52,8 +53,9 @@ pub(in crate::engine) fn seen_past(view: &View, squares: &[([f32; 3], f32)]) -> 
         let [min, max] = [-0.5, 0.5].map(|part| Vec3::from(middle) + part * width);
         occluders.add(node, [min, max].map(Vec3::as_dvec3), &square(middle, width));
     }
+    let of = |&(middle, _): &([f32; 3], f32)| sketch(middle.map(f64::from), 1.0, vec![]);
     let mut seen = SeenAreas::new(Arc::new(occluders), 0.1);
-    seen.look(view, 0.0);
+    seen.look(&tree(squares.iter().map(of).collect()), view, 0.0);
     seen
 }
 

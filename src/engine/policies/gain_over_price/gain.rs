@@ -38,8 +38,9 @@ impl Gain {
     /// how much less wrong its pixels are.
     pub fn of(&mut self, frame: &FrameInput<'_>, node: u32) -> f64 {
         let per_metre = frame.tree.pixels_per_metre(node, frame.view);
-        let part = self.seen(frame, node) * per_metre * per_metre;
-        part.min(1.0) * removed(frame.tree, node, per_metre)
+        let area = self.seen(frame, node);
+        SeenAreas::in_picture(frame.tree, node, frame.view, area)
+            * removed(frame.tree, node, per_metre)
     }
 
     /// The most that was seen of a node, of late.
@@ -62,8 +63,8 @@ impl Gain {
     /// The same from another view, as far as is seen of nodes as a rule.
     pub fn expected(tree: &SceneTree, node: u32, view: &View) -> f64 {
         let per_metre = tree.pixels_per_metre(node, view);
-        let part = SeenAreas::usual(tree, node, view) * per_metre * per_metre;
-        part.min(1.0) * removed(tree, node, per_metre)
+        let area = SeenAreas::usual(tree, node, view);
+        SeenAreas::in_picture(tree, node, view, area) * removed(tree, node, per_metre)
     }
 
     /// The same of what need not be in view, where all of it would be seen.
@@ -88,6 +89,6 @@ pub(in crate::engine) fn removed(tree: &SceneTree, node: u32, per_metre: f64) ->
 pub(in crate::engine) fn part_of_picture(frame: &FrameInput<'_>, node: u32) -> f64 {
     let &FrameInput { tree, view, seen, .. } = frame;
     let area = seen.and_then(|seen| seen.of(tree, node));
-    let per_metre = tree.pixels_per_metre(node, view);
-    (area.unwrap_or_else(|| SeenAreas::usual(tree, node, view)) * per_metre * per_metre).min(1.0)
+    let area = area.unwrap_or_else(|| SeenAreas::usual(tree, node, view));
+    SeenAreas::in_picture(tree, node, view, area)
 }
