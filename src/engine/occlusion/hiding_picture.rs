@@ -1,5 +1,7 @@
 //! How far away what hides others is.
 
+use std::cmp::Ordering;
+
 use glam::{DVec3, Vec3};
 
 use super::node_occlusion::NodeOcclusion;
@@ -54,13 +56,14 @@ impl HidingPicture {
         self.eye = view.pose.position;
         self.axes = [across * (size[0] / 2.0), -up * (size[1] / 2.0), view.frustum.forward];
         self.near = near;
+        let sides = self.sides();
         let mut candidates = std::mem::take(&mut self.candidates);
         candidates.clear();
         for (node, occlusion) in (0..).zip(nodes) {
             let offset = (occlusion.origin - self.eye).as_vec3();
             for (at, slab) in (0..).zip(&occlusion.slabs) {
                 let part = slab.part_of_view(slab.middle + offset);
-                if part > LEAST_PART && self.is_ahead(slab, offset) {
+                if part > LEAST_PART && is_in_view(&sides, slab, offset) {
                     candidates.push((part, node, at));
                 }
             }
@@ -79,11 +82,13 @@ impl HidingPicture {
         self.candidates = candidates;
     }
 
-    /// Whether any of it is before the eye.
-    fn is_ahead(&self, slab: &Slab, offset: Vec3) -> bool {
-        let forward = self.axes[2].as_vec3();
-        let reach = slab.half.map(|half| half.dot(forward).abs());
-        (slab.middle + offset).dot(forward) + reach[0] + reach[1] > 0.0
+    /// Normals of the planes through the eye between which the view is, which point into it: its four
+    /// sides, and what is before the eye.
+    fn sides(&self) -> [Vec3; 5] {
+        let [right, down, forward] = self.axes;
+        let [half_width, half_height] = self.size.map(|pixels| forward * (pixels / 2.0));
+        [half_width - right, half_width + right, half_height - down, half_height + down, forward]
+            .map(|side| side.as_vec3())
     }
 
     fn seen(&self, at: DVec3) -> DVec3 {
@@ -156,20 +161,25 @@ impl HidingPicture {
             return;
         }
         let slope = farthest[0] as f32;
+        // Each bound is a line; where it meets a row. Those along the rows bound these themselves.
+        let mut lines = [[f64::NEG_INFINITY, 0.0], [f64::INFINITY, 0.0]].map(|line| [line; 9]);
+        let mut along = [[0.0, 1.0]; 9];
+        for (at, &[a, b, c]) in bounds.iter().enumerate() {
+            match a.total_cmp(&0.0) {
+                _ if a == 0.0 => along[at] = [b, c],
+                Ordering::Greater => lines[0][at] = [-c / a, -b / a],
+                _ => lines[1][at] = [-c / a, -b / a],
+            }
+        }
         for row in rows {
             let y = row as f64;
-            let (mut left, mut right) = (0.0f64, self.columns as f64 - 1.0);
-            for [a, b, c] in bounds {
-                let at = b * y + c;
-                if *a > 0.0 {
-                    left = left.max(-at / a);
-                } else if *a < 0.0 {
-                    right = right.min(-at / a);
-                } else if at <= 0.0 {
-                    right = -1.0;
-                }
+            if along.iter().any(|[b, c]| b * y + c <= 0.0) {
+                continue;
             }
-            let left = left.ceil();
+            let column = |[from, slope]: &[f64; 2]| from + slope * y;
+            let left = lines[0].iter().map(column).fold(0.0, f64::max).ceil();
+            let last = self.columns as f64 - 1.0;
+            let right = lines[1].iter().map(column).fold(last, f64::min);
             if left > right {
                 continue;
             }
@@ -205,6 +215,16 @@ impl HidingPicture {
             cells.iter().all(|&cell| cell >= inverse)
         })
     }
+}
+
+/// Whether any of a slab may be between sides of a view.
+fn is_in_view(sides: &[Vec3; 5], slab: &Slab, offset: Vec3) -> bool {
+    let middle = slab.middle + offset;
+    let [u, v] = slab.half;
+    sides.iter().all(|side| {
+        let reach = side.dot(u).abs() + side.dot(v).abs() + side.dot(slab.half_across).abs();
+        side.dot(middle) + reach > 0.0
+    })
 }
 
 /// One over the depth of the plane of a face along the ray through (x, y, 1): a x + b y + c.
