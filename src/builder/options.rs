@@ -96,15 +96,13 @@ impl BuildOptions {
             "jpeg_quality": self.jpeg_quality,
             "max_atlas": self.max_atlas,
             "textured_weight": self.textured_weight,
+            "districts": if self.districts { "on" } else { "off" },
         });
         if let Some(quantization) = self.quantization() {
             quantization.note(&mut parameters);
         }
         if self.compress {
             parameters["compress"] = "meshopt".into();
-        }
-        if !self.districts {
-            parameters["districts"] = "off".into();
         }
         if self.placement != Placement::Local {
             parameters[PLACEMENT] = serde_json::json!(self.placement);
