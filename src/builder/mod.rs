@@ -1,6 +1,7 @@
 //! From imported models to nodes on disk.
 //!
 //! - [`pipeline`]: the whole build; [`block`]: one input to the trees of its blocks
+//! - [`subset`] and [`merge`]: shares of a build for several machines, and one result of all of them
 //! - [`districts`]: nodes above the blocks, made from these nodes' files
 //! - [`blocks`]: what a block is: groups merged, divided and gathered
 //! - [`stitch`]: borders of the source that touch without sharing vertices
@@ -24,6 +25,7 @@ pub mod error;
 pub mod hierarchy;
 pub mod inputs;
 pub mod memory;
+pub mod merge;
 pub mod options;
 pub mod pipeline;
 pub mod progress;
@@ -31,8 +33,10 @@ pub mod reuse;
 pub mod simplify;
 pub mod stages;
 pub mod stitch;
+pub mod subset;
 pub mod threads;
 pub mod up;
 
 pub use options::BuildOptions;
-pub use pipeline::{Outcome, build};
+pub use pipeline::{Outcome, build, build_subset, merge_subsets};
+pub use subset::Subset;

@@ -2,6 +2,7 @@
 
 use crate::builder::blocks::plan::BlockMode;
 use crate::builder::hierarchy::HierarchyOptions;
+use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::lattice::{Quantization, STEPS};
 use crate::mesh::UpAxis;
 use crate::place::{PLACEMENT, Placement, placement_of};
@@ -109,6 +110,53 @@ impl BuildOptions {
         }
         parameters
     }
+
+    /// The options of a result of this version, by its parameters.
+    pub fn from_json(parameters: &serde_json::Value) -> Result<Self> {
+        let hierarchy = HierarchyOptions {
+            tree: read(parameters, "tree")?,
+            desired_tris: read(parameters, "desired_tris")?,
+            level_factor: read(parameters, "level_factor")?,
+            simplify_from: read(parameters, "simplify_from")?,
+            simplifier: read(parameters, "simplifier")?,
+            borders: read(parameters, "borders")?,
+            weights: AppearanceWeights {
+                texture: read(parameters, "texture_weight")?,
+                color: read(parameters, "color_weight")?,
+                ..AppearanceWeights::default()
+            },
+            seams: read(parameters, "seams")?,
+            ..HierarchyOptions::default()
+        };
+        let blocks: String = read(parameters, "blocks")?;
+        let districts: String = read(parameters, "districts")?;
+        let options = Self {
+            hierarchy,
+            blocks: blocks.parse().map_err(|what| unknown("blocks", &what))?,
+            up: read(parameters, "up")?,
+            placement: placement_of(parameters)?,
+            jpeg_quality: read(parameters, "jpeg_quality")?,
+            max_atlas: read(parameters, "max_atlas")?,
+            quantize: Quantization::of(parameters).map(|quantization| quantization.step),
+            compress: parameters.get("compress").is_some(),
+            textured_weight: read(parameters, "textured_weight")?,
+            districts: districts == "on",
+            force: false,
+        };
+        options.check()?;
+        match options.to_json() == *parameters {
+            true => Ok(options),
+            false => Err(unknown("all", &"expected those of this version")),
+        }
+    }
+}
+
+fn read<T: serde::de::DeserializeOwned>(parameters: &serde_json::Value, name: &str) -> Result<T> {
+    T::deserialize(&parameters[name]).map_err(|error| unknown(name, &error))
+}
+
+fn unknown(name: &str, what: &dyn std::fmt::Display) -> Error {
+    Error::Usage(format!("the result's parameters: {name}: {what}"))
 }
 
 /// True where nodes built with these parameters are the same.
@@ -122,4 +170,58 @@ pub fn same_nodes(one: &serde_json::Value, other: &serde_json::Value) -> bool {
         parameters
     };
     without(one) == without(other)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::hierarchy::{BorderMode, SimplifyFrom, TreeShape};
+    use crate::builder::simplify::ladder::Simplifier;
+    use crate::texture::Seams;
+
+    #[test]
+    fn options_of_a_result_are_those_that_it_was_built_with() {
+        let other = BuildOptions {
+            hierarchy: HierarchyOptions {
+                tree: TreeShape::Thesis,
+                desired_tris: 123,
+                level_factor: 7,
+                simplify_from: SimplifyFrom::Original,
+                simplifier: Simplifier::Clustering,
+                borders: BorderMode::Locked,
+                seams: Seams::Bake,
+                ..HierarchyOptions::default()
+            },
+            blocks: BlockMode::Grid(12.5),
+            up: Some(UpAxis::Y),
+            placement: Placement::Crs { epsg: 25832, height_offset: 46.5 },
+            jpeg_quality: 71,
+            max_atlas: 777,
+            quantize: Some(0.01),
+            compress: true,
+            districts: false,
+            ..BuildOptions::default()
+        };
+        for options in [BuildOptions::default(), other] {
+            let parameters = options.to_json();
+            let read = BuildOptions::from_json(&parameters).unwrap();
+            assert_eq!(read.to_json(), parameters);
+            assert_eq!(read.hierarchy.weights.texture, options.hierarchy.weights.texture);
+        }
+    }
+
+    #[test]
+    fn parameters_that_are_not_known_are_named() {
+        let refused = |name: &str, value: serde_json::Value| {
+            let mut parameters = BuildOptions::default().to_json();
+            parameters[name] = value;
+            BuildOptions::from_json(&parameters).unwrap_err().to_string()
+        };
+        for (name, value) in [("tree", "round".into()), ("level_factor", (-1).into())] {
+            let what = refused(name, value);
+            assert!(what.contains(name), "{what}");
+        }
+        assert!(refused("level_factor", 1.into()).contains("level factor is 1"));
+        assert!(refused("roofs", "flat".into()).contains("expected those of this version"));
+    }
 }

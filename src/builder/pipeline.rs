@@ -12,16 +12,18 @@ use crate::builder::emit::forest::{append_nodes, make_errors_monotone, set_block
 use crate::builder::emit::shared_textures::write_textures;
 use crate::builder::hierarchy::Tree;
 use crate::builder::inputs::{describe, fingerprint, text_of, unchanged};
+use crate::builder::merge::Subsets;
 use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
 use crate::builder::reuse::Earlier;
 use crate::builder::simplify::ladder::BUDGET_TOLERANCE;
 use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::{Stage, Stages};
+use crate::builder::subset::Subset;
 use crate::cpu_time::CpuTime;
 use crate::format::{
-    BlockInfo, Node, OutputDir, REPORT_FILE, SCENE_FILE, Scene, SharedTexture, check_apart,
-    fits_in_steps,
+    BlockInfo, Node, OutputDir, REPORT_FILE, SCENE_FILE, SUBSETS_DIR, Scene, SharedTexture,
+    check_apart, fits_in_steps,
 };
 use crate::lattice::Quantization;
 use crate::mesh::{Model, UpAxis, Warnings};
@@ -29,7 +31,7 @@ use crate::place::placement_of;
 use crate::place::{Globe, z_up};
 use crate::report::build_report::{
     Baked, BlockCut, BuildReport, Count, FileReport, InputReport, OverBudget, Quantized,
-    SharedTexturesReport, StageReport, UpFrom, level_reports,
+    SharedTexturesReport, StageReport, SubsetReport, UpFrom, level_reports,
 };
 use crate::texture::{BakeReason, SharedTextures};
 use crate::{Error, Result, import, tileset};
@@ -50,17 +52,86 @@ pub fn build(
     options: &BuildOptions,
     progress: &dyn Progress,
 ) -> Result<Outcome> {
+    let subsets = out.join(SUBSETS_DIR);
+    if subsets.exists() {
+        let what =
+            "holds subsets, which hlod-build merge joins; choose another folder, or remove them";
+        return Err(Error::output(&subsets, what));
+    }
+    run(arguments, out, options, None, progress)
+}
+
+/// Builds a share of what [`build`] builds, into a folder of `out`: all shares together, on any machines,
+/// are joined by [`merge_subsets`]. Arguments and options are those of the whole, and paths must be the same
+/// on all machines, since files of nodes are named by them.
+pub fn build_subset(
+    arguments: &[PathBuf],
+    out: &Path,
+    options: &BuildOptions,
+    subset: Subset,
+    progress: &dyn Progress,
+) -> Result<Outcome> {
+    run(arguments, out, options, Some(subset), progress)
+}
+
+/// Joins all subsets that stand in `out` to what [`build`] would have built of all inputs, and removes
+/// them. Inputs are not read again.
+pub fn merge_subsets(out: &Path, progress: &dyn Progress) -> Result<BuildReport> {
+    let begin = Instant::now();
+    let subsets = Subsets::open(out)?;
+    let parameters = subsets.parameters().clone();
+    let options = BuildOptions::from_json(&parameters)?;
+    let output = OutputDir::create(out)?;
+    let run = Run {
+        globe: options.placement.globe()?,
+        options: &options,
+        output: &output,
+        shared: SharedTextures::new(),
+        stages: &Stages::default(),
+        progress,
+    };
+    let mut done = Done::default();
+    for (input, result) in subsets.inputs() {
+        progress.found(input.triangles);
+        run.take_over(input, result, &mut done)?;
+    }
+    progress.finishing();
+    let earlier = Earlier::open(out, &parameters);
+    done.repeating_texels = subsets.repeating_texels();
+    let report = run.finish(done, earlier.as_ref(), parameters, None, begin)?;
+    output.commit()?;
+    Ok(report)
+}
+
+fn run(
+    arguments: &[PathBuf],
+    out: &Path,
+    options: &BuildOptions,
+    subset: Option<Subset>,
+    progress: &dyn Progress,
+) -> Result<Outcome> {
     let begin = Instant::now();
     options.check()?;
     let globe = options.placement.globe()?;
-    let inputs = import::find_inputs(arguments)?;
+    let all_inputs = import::find_inputs(arguments)?;
     // A folder that was given counts as a whole: what is built into it would be an input the next
     // time.
-    check_apart(out, arguments.iter().chain(&inputs))?;
+    check_apart(out, arguments.iter().chain(&all_inputs))?;
+    let inputs = match subset {
+        Some(subset) => subset.pick(&all_inputs)?,
+        None => all_inputs.clone(),
+    };
+    let target = subset.map_or_else(|| out.to_owned(), |subset| subset.dir(out));
+    let part = subset.map(|subset| SubsetReport {
+        subset,
+        all_inputs: all_inputs.iter().map(|input| text_of(input)).collect(),
+    });
     let stages = Stages::default();
     let parameters = options.to_json();
 
-    let earlier = if options.force { None } else { Earlier::open(out, &parameters) };
+    // What a subset has not built before may be in the result of a merge.
+    let open = |dir: &Path| Earlier::open(dir, &parameters);
+    let earlier = if options.force { None } else { open(&target).or_else(|| open(out)) };
     let still_good: Vec<Option<InputReport>> = stages.time(Stage::Compare, || {
         let same = |input: &PathBuf| {
             let report = earlier.as_ref()?.input(&text_of(input))?;
@@ -71,12 +142,13 @@ pub fn build(
     if let Some(earlier) = &earlier
         && still_good.iter().all(Option::is_some)
         && earlier.report.inputs.len() == inputs.len()
+        && earlier.report.subset == part
         && earlier.tileset
     {
         return Ok(Outcome::UpToDate(earlier.report.clone()));
     }
 
-    let output = OutputDir::create(out)?;
+    let output = OutputDir::create(&target)?;
     let run = Run {
         options,
         globe,
@@ -85,9 +157,9 @@ pub fn build(
         stages: &stages,
         progress,
     };
-    let done = run.inputs(&inputs, &still_good, earlier.as_ref())?;
+    let done = run.inputs(&inputs, all_inputs.len(), &still_good, earlier.as_ref())?;
     progress.finishing();
-    let report = run.finish(done, earlier.as_ref(), parameters, begin)?;
+    let report = run.finish(done, earlier.as_ref(), parameters, part, begin)?;
     output.commit()?;
     Ok(Outcome::Built(report))
 }
@@ -109,13 +181,26 @@ struct Done {
     blocks: Vec<BuiltBlock>,
     /// Shared textures of earlier results, by name.
     reused_textures: BTreeMap<String, SharedTexture>,
+    /// Texels of repeating textures that sources of subsets use.
+    repeating_texels: u64,
 }
 
 impl Run<'_> {
-    /// Builds inputs one after another, or takes over what `still_good` says of them.
+    /// Links what an earlier result has of an input.
+    fn take_over(&self, input: &InputReport, earlier: &Earlier, done: &mut Done) -> Result<()> {
+        let taken = earlier.take_over(input, self.output)?;
+        self.progress.built(input.triangles);
+        done.reused_textures.extend(taken.shared_textures);
+        done.blocks.extend(taken.blocks);
+        done.reports.push(input.clone());
+        Ok(())
+    }
+
+    /// Builds inputs one after another, of so many in all, or takes over what `still_good` says of them.
     fn inputs(
         &self,
         inputs: &[PathBuf],
+        all: usize,
         still_good: &[Option<InputReport>],
         earlier: Option<&Earlier>,
     ) -> Result<Done> {
@@ -123,11 +208,7 @@ impl Run<'_> {
         let mut ahead: Option<Result<Model>> = None;
         for (number, input) in inputs.iter().enumerate() {
             if let (Some(report), Some(earlier)) = (&still_good[number], earlier) {
-                let taken = earlier.take_over(report, self.output)?;
-                self.progress.built(report.triangles);
-                done.reused_textures.extend(taken.shared_textures);
-                done.blocks.extend(taken.blocks);
-                done.reports.push(report.clone());
+                self.take_over(report, earlier, &mut done)?;
                 continue;
             }
             self.progress.reading(input, number + 1, inputs.len());
@@ -135,10 +216,8 @@ impl Run<'_> {
             // Only the input that comes next in turn, and only where both fit in memory.
             let is_next = still_good.get(number + 1).is_some_and(Option::is_none);
             let next = inputs.get(number + 1).filter(|next| is_next && fits_beside(input, next));
-            let (built, read_ahead) = rayon::join(
-                || self.input(input, model, inputs.len()),
-                || next.map(|next| self.load(next)),
-            );
+            let (built, read_ahead) =
+                rayon::join(|| self.input(input, model, all), || next.map(|next| self.load(next)));
             ahead = read_ahead;
             let (blocks, report) = built?;
             done.blocks.extend(blocks);
@@ -209,17 +288,19 @@ impl Run<'_> {
         done: Done,
         earlier: Option<&Earlier>,
         parameters: serde_json::Value,
+        subset: Option<SubsetReport>,
         begin: Instant,
     ) -> Result<BuildReport> {
-        let Done { reports, blocks, reused_textures } = done;
-        let source_texels =
-            reports.iter().map(|input| input.texels).sum::<u64>() + self.shared.source_texels();
+        let Done { reports, blocks, reused_textures, repeating_texels } = done;
+        let source_texels = reports.iter().map(|input| input.texels).sum::<u64>()
+            + self.shared.source_texels()
+            + repeating_texels;
         let mut warnings = warnings(&reports, earlier, self.globe.as_ref());
         let mut shared_textures = write_textures(self.shared, reused_textures, self.output)?;
         let up = agreed_up(&reports, &mut warnings);
         let (infos, trees) = numbered(blocks);
         let Districts { trees, reports: districts, warnings: imperfect } =
-            match self.options.districts {
+            match self.options.districts && subset.is_none() {
                 true => {
                     let Self { options, output, stages, progress, .. } = self;
                     let cuts: Vec<BlockCut> =
@@ -235,7 +316,7 @@ impl Run<'_> {
         let baked = baked(&trees);
         let scene = scene_of(infos, trees, shared_textures, parameters.clone(), up, &reports)?;
         let quantization = self.options.quantization();
-        if let (Some(quantization), Some(bounds)) = (quantization, scene.bounds()) {
+        if let (Some(quantization), Some(bounds), None) = (quantization, scene.bounds(), &subset) {
             quantization.check_extent(bounds)?;
         }
         let tilesets = self.stages.time(Stage::Write, || write_tilesets(&scene, self.output))?;
@@ -249,6 +330,7 @@ impl Run<'_> {
         let report = BuildReport {
             version: env!("CARGO_PKG_VERSION").into(),
             parameters,
+            subset,
             source_triangles: reports.iter().map(|input| input.triangles).sum(),
             source_texels,
             levels,

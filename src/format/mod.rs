@@ -56,6 +56,8 @@ pub use scene_check::{Element, SceneDefect};
 pub const TILESET_FILE: &str = "tileset.json";
 /// The folder of tilesets of regions inside an output folder.
 pub const TILESETS_DIR: &str = "tilesets";
+/// The folder of results of subsets inside an output folder, until they are merged.
+pub const SUBSETS_DIR: &str = "subsets";
 /// The scene description inside an output folder.
 pub const SCENE_FILE: &str = "scene.hlod";
 /// The folder of node files inside an output folder.

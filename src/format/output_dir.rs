@@ -11,9 +11,11 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
 use super::{
-    NODES_DIR, REPORT_FILE, SCENE_FILE, SCENE_MAGIC, TEXTURES_DIR, TILESET_FILE, TILESETS_DIR,
+    NODES_DIR, REPORT_FILE, SCENE_FILE, SCENE_MAGIC, SUBSETS_DIR, TEXTURES_DIR, TILESET_FILE,
+    TILESETS_DIR,
     cells::{CELLS_DIR, CELLS_FILE},
 };
+use crate::builder::Subset;
 use crate::{Error, Result};
 
 const PARTIAL: &str = "hlod-partial-";
@@ -226,6 +228,7 @@ fn refuse_foreign(path: &Path, target: &Path) -> Result<()> {
     }
     let what = match first_foreign(target, &names) {
         Some(name) => format!("holds {}, which is not of an earlier build", name.display()),
+        None if names.iter().all(|name| name == SUBSETS_DIR) => return Ok(()),
         None if !begins_with_magic(&target.join(SCENE_FILE)) => {
             format!("is not empty, and its {SCENE_FILE} is not of an earlier build")
         }
@@ -250,6 +253,7 @@ fn first_foreign(target: &Path, names: &[OsString]) -> Option<PathBuf> {
             Some(NODES_DIR | CELLS_DIR) => &["glb"],
             Some(TEXTURES_DIR) => &["jpg", "png"],
             Some(TILESETS_DIR) => &["json"],
+            Some(SUBSETS_DIR) if is_of_subsets(&target.join(name)) => continue,
             _ => return Some(name.into()),
         };
         // What is not a folder, or cannot be listed, is not ours either.
@@ -265,6 +269,26 @@ fn first_foreign(target: &Path, names: &[OsString]) -> Option<PathBuf> {
         }
     }
     None
+}
+
+/// Whether there is nothing in a folder but results of subsets, finished or not.
+fn is_of_subsets(folder: &Path) -> bool {
+    let Ok(names) = fs::read_dir(folder).and_then(sorted_names) else { return false };
+    let is_ours = |name: &OsString| {
+        let name = name.to_string_lossy();
+        let unfinished = name.strip_prefix('.').and_then(|name| name.split_once('.'));
+        match unfinished {
+            Some((subset, rest)) => {
+                Subset::of_dir(subset).is_some()
+                    && (rest.starts_with(PARTIAL) || rest.starts_with(ASIDE))
+            }
+            None => {
+                Subset::of_dir(&name).is_some()
+                    && begins_with_magic(&folder.join(&*name).join(SCENE_FILE))
+            }
+        }
+    };
+    names.iter().all(is_ours)
 }
 
 fn begins_with_magic(path: &Path) -> bool {

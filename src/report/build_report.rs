@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::builder::Subset;
 use crate::mesh::{Kept, UpAxis, Warnings};
 use crate::texture::BakeReason;
 use crate::{Error, Result};
@@ -17,6 +18,9 @@ pub struct BuildReport {
     pub version: String,
     /// What it was asked for; the same as [`Scene::parameters`](crate::format::Scene).
     pub parameters: serde_json::Value,
+    /// Where it is of a share of the inputs alone: of which, and what all of them are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub subset: Option<SubsetReport>,
     /// What it was built from, in order of path, so that the order of the arguments changes nothing.
     pub inputs: Vec<InputReport>,
     /// Triangles of all inputs after import.
@@ -54,6 +58,16 @@ pub struct BuildReport {
     pub districts: Vec<DistrictReport>,
     /// What was imperfect and how often, in the order in which it was met.
     pub warnings: Vec<Count>,
+}
+
+/// Which share of a build's inputs a result is of.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SubsetReport {
+    /// Which of how many.
+    #[serde(flatten)]
+    pub subset: Subset,
+    /// Paths of the inputs of all of them, in order.
+    pub all_inputs: Vec<String>,
 }
 
 /// A node above the blocks.

@@ -20,6 +20,7 @@ mod quantize;
 mod real_data;
 mod seams;
 mod soups;
+mod subsets;
 mod tileset;
 mod touching;
 mod verify;

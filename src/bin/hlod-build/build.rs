@@ -9,7 +9,7 @@ use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom, TreeS
 use hlod::builder::progress::Progress;
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::builder::threads::with_threads;
-use hlod::builder::{BuildOptions, Outcome, build};
+use hlod::builder::{BuildOptions, Outcome, Subset, build, build_subset, merge_subsets};
 use hlod::mesh::UpAxis;
 use hlod::place::{Place, Placement};
 use hlod::report::build_summary;
@@ -108,6 +108,11 @@ pub struct BuildArgs {
     #[arg(long, value_enum, default_value_t = CompressArg::None, help_heading = "Files")]
     compress: CompressArg,
 
+    /// Build the Kth of N shares of the inputs, into OUT/subsets/K-of-N: N machines that see the same
+    /// files build one each, and `hlod-build merge OUT` joins them. Inputs, as they are written here, and
+    /// options must be the same for all
+    #[arg(long, value_name = "K/N", help_heading = "Running")]
+    subset: Option<Subset>,
     /// Threads, 0-1024; 0 is one for each core. The result does not depend on it
     #[arg(long, short = 'j', value_name = "N", default_value_t = 0, help_heading = "Running")]
     threads: usize,
@@ -277,16 +282,45 @@ pub fn run(arguments: &BuildArgs) -> Result<()> {
     };
     let options = arguments.options();
     let bar = Bar::new(arguments.quiet);
-    let outcome = with_threads(arguments.threads, || build(inputs, out, &options, &bar))?;
+    let outcome = with_threads(arguments.threads, || match arguments.subset {
+        Some(subset) => build_subset(inputs, out, &options, subset, &bar),
+        None => build(inputs, out, &options, &bar),
+    })?;
     bar.bar.finish_and_clear();
     let outcome = outcome?;
     if arguments.quiet {
         return Ok(());
     }
+    let out = arguments.subset.map_or_else(|| out.clone(), |subset| subset.dir(out));
     print(&match outcome {
-        Outcome::UpToDate(report) => build_summary::up_to_date(&report, out),
-        Outcome::Built(report) => build_summary::built(&report, out),
+        Outcome::UpToDate(report) => build_summary::up_to_date(&report, &out),
+        Outcome::Built(report) => build_summary::built(&report, &out),
     })
+}
+
+#[derive(Args, Debug)]
+pub struct MergeArgs {
+    /// The output folder in which all subsets stand
+    out: PathBuf,
+    /// Threads, 0-1024; 0 is one for each core. The result does not depend on it
+    #[arg(long, short = 'j', value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// Joins subsets, and prints what was built.
+pub fn merge(arguments: &MergeArgs) -> Result<()> {
+    let MergeArgs { out, threads, quiet } = arguments;
+    let bar = Bar::new(*quiet);
+    let report = with_threads(*threads, || merge_subsets(out, &bar))?;
+    bar.bar.finish_and_clear();
+    let report = report?;
+    match quiet {
+        true => Ok(()),
+        false => print(&build_summary::built(&report, out)),
+    }
 }
 
 /// Progress on a terminal; nothing elsewhere.

@@ -8,7 +8,7 @@ mod verify;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use build::BuildArgs;
+use build::{BuildArgs, MergeArgs};
 use cells::CellsArgs;
 use clap::{Parser, Subcommand};
 use hlod::Result;
@@ -29,7 +29,7 @@ use verify::VerifyArgs;
     version,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    override_usage = "hlod-build [OPTIONS] INPUT... OUT\n       hlod-build inspect [--json] OUT\n       hlod-build verify [--json] [--source MODEL]... OUT\n       hlod-build cells [OPTIONS] OUT",
+    override_usage = "hlod-build [OPTIONS] INPUT... OUT\n       hlod-build inspect [--json] OUT\n       hlod-build verify [--json] [--source MODEL]... OUT\n       hlod-build cells [OPTIONS] OUT\n       hlod-build merge OUT",
     after_help = "Examples:\n  hlod-build city.obj out/\n  hlod-build --blocks grid:200 tiles/ more.glb out/\n  hlod-build inspect out/\n  hlod-build verify out/ --source city.obj\n  hlod-build cells out/ --along walk.csv\n\nExit codes: 0 success, 1 internal error, 2 usage, 3 input missing or invalid, or what verify looked at does not hold, 4 output not written, 5 no graphics adapter (cells)."
 )]
 struct Cli {
@@ -59,6 +59,8 @@ enum Command {
     /// (`hlod-bench --far-field cells`). Writes OUT/cells.hlod (index) and OUT/cells/*.glb; goes on where an
     /// earlier run was stopped. Needs a graphics adapter, or Mesa's lavapipe (Debian: mesa-vulkan-drivers)
     Cells(CellsArgs),
+    /// Joins what machines built of one city with --subset: the same files as one build of all inputs
+    Merge(MergeArgs),
 }
 
 fn main() -> ExitCode {
@@ -69,6 +71,7 @@ fn main() -> ExitCode {
         }
         Some(Command::Verify(arguments)) => verify::verify_scene(&arguments),
         Some(Command::Cells(arguments)) => cells::cells(&arguments).map(|()| ExitCode::SUCCESS),
+        Some(Command::Merge(arguments)) => build::merge(&arguments).map(|()| ExitCode::SUCCESS),
         None => build::run(&cli.build).map(|()| ExitCode::SUCCESS),
     };
     match done {
