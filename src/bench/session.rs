@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, Mutex};
 
 use super::{
     BenchOptions, ClockConstants, Context, FrameInspector, FrameRecord, ModelBackend,
@@ -18,12 +18,22 @@ use crate::runtime::SceneTree;
 use crate::runtime::residency::{Residency, Sizes};
 use crate::{Error, Result};
 
-/// Triangles of the surfaces that tell what hides what: some 6 MB.
+/// Triangles of the surfaces that tell what hides what, at most: some 6 MB,
 const OCCLUDER_TRIANGLES: u64 = 200_000;
+
+/// or this part of the memory cap, where each takes so many bytes with its vertices.
+const OCCLUDER_PART: u64 = 8;
+const OCCLUDER_BYTES: u64 = 32;
 
 /// Triangles that are drawn at the start of a run to learn what things take, unless the roots have more.
 #[cfg(feature = "render")]
 const TIMED_TRIANGLES: u64 = 200_000;
+
+/// How many triangles they may have in a run.
+fn occluder_triangles(options: &BenchOptions) -> u64 {
+    let cap = options.residency.max_memory_bytes;
+    (cap / OCCLUDER_PART / OCCLUDER_BYTES).min(OCCLUDER_TRIANGLES)
+}
 
 /// A built scene that is open for runs.
 #[derive(Clone, Debug)]
@@ -31,8 +41,8 @@ pub struct Session {
     dir: PathBuf,
     scene: Arc<Scene>,
     tree: SceneTree,
-    /// Read where a policy first asks for it.
-    occluders: OnceLock<Arc<Occluders>>,
+    /// By how many triangles they may have, read where a policy first asks for them.
+    occluders: Arc<Mutex<BTreeMap<u64, Arc<Occluders>>>>,
     /// For runs in which nothing is drawn.
     occlusions: Arc<ModelOcclusions>,
     cells: Option<Arc<Cells>>,
@@ -44,7 +54,7 @@ impl Session {
         let scene = Arc::new(Scene::read(dir)?.breadth_first());
         let tree = SceneTree::new(&scene);
         let occlusions = Arc::new(ModelOcclusions::new(NodeFiles::new(dir, Arc::clone(&scene))));
-        let (dir, occluders) = (dir.to_owned(), OnceLock::new());
+        let (dir, occluders) = (dir.to_owned(), Arc::default());
         Ok(Self { dir, scene, tree, occluders, occlusions, cells: None })
     }
 
@@ -130,7 +140,7 @@ impl Session {
         // Held for as long as the roots are.
         let mut beside_roots: BTreeMap<u32, u64> = BTreeMap::new();
         if policy.wants_seen_areas() {
-            for node in self.occluding_nodes() {
+            for node in self.occluding_nodes(occluder_triangles(options)) {
                 let at = self.tree.node(node);
                 *beside_roots.entry(self.tree.root_of(node)).or_default() +=
                     Occluders::most_bytes(at.vertices, at.triangles);
@@ -160,26 +170,38 @@ impl Session {
         }
     }
 
-    /// Nodes whose surfaces tell what is seen: a coarse front, and all above it.
-    fn occluding_nodes(&self) -> BTreeSet<u32> {
-        let front = self.scene.coarse_front(OCCLUDER_TRIANGLES);
+    /// Nodes whose surfaces tell what is seen: a coarse front of so many triangles, and all above it.
+    fn occluding_nodes(&self, triangles: u64) -> BTreeSet<u32> {
+        let front = self.scene.coarse_front(triangles);
         let above = |&node: &u32| self.tree.node(node).parent;
         front.into_iter().flat_map(|node| std::iter::successors(Some(node), above)).collect()
     }
 
     /// Coarse surfaces, for policies that ask what hides what. A file that cannot be used hides nothing;
     /// the run tells of it.
-    fn occluders(&self, policy: &dyn Policy) -> Option<Arc<Occluders>> {
+    fn occluders(
+        &self,
+        options: &BenchOptions,
+        policy: &dyn Policy,
+    ) -> Result<Option<Arc<Occluders>>> {
+        if !policy.wants_seen_areas() {
+            return Ok(None);
+        }
+        let triangles = occluder_triangles(options);
         let read = || {
             let mut occluders = Occluders::default();
-            for node in self.occluding_nodes() {
+            for node in self.occluding_nodes(triangles) {
                 if let Ok(mesh) = self.files().read_mesh(node) {
                     occluders.add(node, self.tree.node(node).bbox, &mesh);
                 }
             }
             Arc::new(occluders)
         };
-        policy.wants_seen_areas().then(|| Arc::clone(self.occluders.get_or_init(read)))
+        let mut known = self
+            .occluders
+            .lock()
+            .map_err(|_| Error::Internal("a thread that read surfaces died".into()))?;
+        Ok(Some(Arc::clone(known.entry(triangles).or_insert_with(read))))
     }
 
     fn context(&self, options: BenchOptions, path: &CameraPath, policy: &dyn Policy) -> Context {
@@ -215,7 +237,7 @@ impl Session {
         let mut policy = options.policy.make()?;
         let tree = self.tree_for(&constants);
         let context = Context { constants, ..self.context(options.clone(), path, &*policy) };
-        let occluders = self.occluders(&*policy);
+        let occluders = self.occluders(&options, &*policy)?;
         let mut backend = ModelBackend::new(&tree, constants, options.seed)
             .with_occlusions(Arc::clone(&self.occlusions))
             .with_cells(cells.clone());
@@ -283,7 +305,7 @@ impl Session {
             adapter: Some(adapter),
             ..self.context(options.clone(), path, &*policy)
         };
-        let occluders = self.occluders(&*policy);
+        let occluders = self.occluders(&options, &*policy)?;
         let mut backend = super::GpuBackend::new(
             &tree,
             if options.cull_hidden { files.with_occlusion() } else { files },
@@ -340,4 +362,21 @@ fn path_fingerprint(path: &CameraPath) -> String {
 
 fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn surfaces_that_hide_take_no_more_than_a_part_of_the_memory() {
+        let triangles = |bytes: u64| {
+            let mut options = BenchOptions::default();
+            options.residency.max_memory_bytes = bytes;
+            occluder_triangles(&options)
+        };
+        assert_eq!(triangles(BenchOptions::default().residency.max_memory_bytes), 200_000);
+        assert_eq!(triangles(6_400_000), 25_000);
+        assert_eq!(triangles(0), 0);
+    }
 }
