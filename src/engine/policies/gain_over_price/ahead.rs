@@ -4,6 +4,7 @@ use glam::DQuat;
 
 use super::Options;
 use super::gain::Gain;
+use super::worth::Worth;
 use crate::camera::{Pose, View};
 use crate::engine::policies::ranked::wholly_refining_ms;
 use crate::engine::{FrameInput, Selection};
@@ -38,9 +39,9 @@ pub(super) struct Ahead {
     /// Nodes in the view at hand, and how many of them were looked at.
     queue: Vec<u32>,
     looked_at: usize,
-    /// What was found in it so far.
+    /// Whose children are wanted in it, as far as was found.
     found: Vec<(u32, f64)>,
-    /// What was found in each view when it was gone through last: nodes by their worth.
+    /// What was found in each view when it was gone through last: whose children are worth how much.
     wanted: [Vec<(u32, f64)>; VIEWS],
     /// By node: the last frame in which it was asked for.
     asked: Vec<u32>,
@@ -57,11 +58,13 @@ struct Look {
 }
 
 impl Ahead {
-    /// Asks for what will rank as high as `least` and is not asked for already.
+    /// Asks for what will rank as high as `least` and is not asked for already. What is in memory is worth
+    /// no less for being expected.
     pub fn request(
         &mut self,
         frame: &FrameInput<'_>,
         least: f64,
+        worth: &Worth,
         options: &Options,
         out: &mut Selection,
     ) {
@@ -74,12 +77,20 @@ impl Ahead {
         for &(node, _) in &out.requests {
             self.asked[node as usize] = self.frame;
         }
-        for &(node, worth) in self.wanted.iter().flatten() {
-            let is_new =
-                std::mem::replace(&mut self.asked[node as usize], self.frame) != self.frame;
-            let is_there = |parent| frame.residents.contains(parent);
-            if is_new && frame.tree.node(node).parent.is_some_and(is_there) {
-                out.ahead.push((node, worth));
+        for &(parent, expected) in self.wanted.iter().flatten() {
+            if !frame.residents.contains(parent) {
+                continue;
+            }
+            let there = expected.max(worth.away(frame, parent, options));
+            for &child in frame.tree.children(parent) {
+                let asked = &mut self.asked[child as usize];
+                if std::mem::replace(asked, self.frame) != self.frame {
+                    let worth = match frame.residents.contains(child) {
+                        true => there,
+                        false => expected / options.hysteresis,
+                    };
+                    out.ahead.push((child, worth));
+                }
             }
         }
     }
@@ -103,7 +114,7 @@ impl Ahead {
             }
             let rank = Gain::expected(frame.tree, node, &view) / wholly_refining_ms(frame, node);
             if rank > least {
-                self.found.extend(children.iter().map(|&child| (child, rank * worth)));
+                self.found.push((node, rank * worth));
                 self.queue.extend(children.iter().filter(|&&at| frame.residents.contains(at)));
             }
         }
@@ -120,7 +131,7 @@ impl Ahead {
             self.wanted[number].clear();
             return;
         };
-        let worth = libm::pow(options.ahead, after_s) / options.hysteresis;
+        let worth = libm::pow(options.ahead, after_s);
         self.at_hand = Some(Look { number, view, worth });
         let roots = frame.tree.roots().iter();
         self.queue.extend(roots.filter(|&&root| frame.residents.contains(root)));
@@ -148,15 +159,21 @@ mod tests {
     use super::*;
     use crate::engine::PredictedView;
     use crate::engine::test_frame::{TestFrame, root};
-    use crate::runtime::test_tree::tree;
+    use crate::runtime::test_tree::{Sketch, tree};
+
+    /// A node with two children 10 m behind the camera.
+    fn behind() -> Sketch {
+        let mut behind = root(10.0, 0.1, 2);
+        behind.centre[0] = -behind.centre[0];
+        behind.children.iter_mut().for_each(|child| child.centre[0] = -child.centre[0]);
+        behind
+    }
 
     /// What is asked for within some frames and what it is worth, where node 0 with children 1 and 2 is
     /// ahead at 10 m, and node 3 with children 4 and 5 as far behind.
     fn asked_for(options: &Options, least: f64, going: Option<DVec3>) -> Vec<(u32, f64)> {
-        let mut behind = root(10.0, 0.1, 2);
-        behind.centre[0] = -behind.centre[0];
-        behind.children.iter_mut().for_each(|child| child.centre[0] = -child.centre[0]);
-        let frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), behind]));
+        let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), behind()]));
+        [1, 2, 4, 5].iter().for_each(|&child| frame.residents.set(child, false));
         let predicted = going.map(|velocity| {
             let mut pose = frame.view.pose;
             pose.position += velocity;
@@ -165,10 +182,12 @@ mod tests {
         let predicted: Vec<PredictedView> = predicted.into_iter().collect();
         let input = FrameInput { predicted: &predicted, ..frame.input() };
         let (mut ahead, mut out) = (Ahead::default(), Selection::default());
+        let mut kept = Worth::default();
+        kept.begin_frame(frame.tree.len(), 0.0);
         for _ in 0..2 * VIEWS {
             out.clear();
             out.requests.push((0, 1.0));
-            ahead.request(&input, least, options, &mut out);
+            ahead.request(&input, least, &kept, options, &mut out);
         }
         out.ahead.sort_unstable_by_key(|&(node, _)| node);
         out.ahead
@@ -184,6 +203,21 @@ mod tests {
         assert_eq!(nodes(&asked_for(&options, 0.0, None)), [4, 5]);
         assert!(asked_for(&options, f64::MAX, None).is_empty());
         assert!(asked_for(&Options { ahead: 0.0, ..options }, 0.0, None).is_empty());
+    }
+
+    #[test]
+    fn what_is_in_memory_is_worth_no_less_for_being_expected() {
+        let frame = TestFrame::new(tree(vec![behind()]));
+        let options = Options::default();
+        let (mut ahead, mut out) = (Ahead::default(), Selection::default());
+        let mut worth = Worth::default();
+        worth.begin_frame(frame.tree.len(), 0.0);
+        for _ in 0..2 * VIEWS {
+            out.clear();
+            ahead.request(&frame.input(), 0.0, &worth, &options, &mut out);
+        }
+        let away = worth.away(&frame.input(), 0, &options);
+        assert_eq!(out.ahead, [(1, away), (2, away)]);
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod leap;
 mod levels;
 #[cfg(test)]
 mod tests;
+mod worth;
 
 use std::collections::BinaryHeap;
 
@@ -29,6 +30,7 @@ use gain::Gain;
 pub(in crate::engine) use gain::{part_of_picture, removed};
 use leap::Leap;
 use levels::Levels;
+use worth::Worth;
 
 /// A frame is full from this part of its budget on.
 const FULL: f64 = 0.9;
@@ -45,16 +47,25 @@ struct Options {
     backoff_s: f64,
     slack: f64,
     away: f64,
+    keep_s: f64,
     ahead: f64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { hysteresis: 1.5, dwell_s: 0.5, backoff_s: 16.0, slack: 0.02, away: 0.2, ahead: 0.2 }
+        Self {
+            hysteresis: 1.5,
+            dwell_s: 0.5,
+            backoff_s: 16.0,
+            slack: 0.02,
+            away: 0.2,
+            keep_s: 16.0,
+            ahead: 0.2,
+        }
     }
 }
 
-const PARAMETERS: [Parameter<Options>; 6] = [
+const PARAMETERS: [Parameter<Options>; 7] = [
     parameter!(hysteresis, 1.0, 100.0, "how many times higher ranks what others make way for"),
     parameter!(dwell_s, 0.0, 60.0, "seconds for which a node keeps a level, unless time is short"),
     parameter!(
@@ -70,6 +81,12 @@ const PARAMETERS: [Parameter<Options>; 6] = [
         "part of its time by which a frame is longer before it is relieved"
     ),
     parameter!(away, 0.0, 1.0, "what a node out of view is worth in memory, over one in view"),
+    parameter!(
+        keep_s,
+        0.1,
+        600.0,
+        "seconds in which what a node was worth in memory is half forgotten"
+    ),
     parameter!(
         ahead,
         0.0,
@@ -96,6 +113,7 @@ struct GainOverPrice {
     levels: Levels,
     leap: Leap,
     ahead: Ahead,
+    worth: Worth,
     /// By node: its rank, where it was visited in the frame at hand.
     ranks: Vec<f64>,
     /// Nodes that could be refined, the highest rank first.
@@ -300,13 +318,15 @@ impl GainOverPrice {
     /// What is wanted in memory: the children of what is visited. What is there makes way only for what
     /// ranks so much higher, as in the image.
     fn request(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
+        self.worth.begin_frame(frame.tree.len(), frame.dt_s);
         out.requests.extend(frame.tree.roots().iter().map(|&root| (root, f64::MAX)));
         for &node in &self.visited {
             let rank = self.ranks[node as usize];
+            let worth = self.worth.in_view(node, rank, &self.options);
             let is_hidden = frame.is_hidden(node);
             out.requests.extend(frame.tree.children(node).iter().filter_map(|&child| {
                 match frame.residents.contains(child) {
-                    true => Some((child, rank)),
+                    true => Some((child, worth)),
                     false => (!is_hidden).then_some((child, rank / self.options.hysteresis)),
                 }
             }));
@@ -364,16 +384,14 @@ impl Policy for GainOverPrice {
         self.request(frame, out);
         // Where there is time, whatever comes into view will be refined.
         let is_full = ms > FULL * frame.budget_ms;
-        self.ahead.request(frame, if is_full { least } else { 0.0 }, &self.options, out);
+        let least = if is_full { least } else { 0.0 };
+        self.ahead.request(frame, least, &self.worth, &self.options, out);
         count_culled(frame, out);
     }
 
     fn utility(&self, frame: &FrameInput<'_>, node: u32) -> f64 {
         match frame.tree.node(node).parent {
-            Some(parent) => {
-                self.options.away * Gain::anywhere(frame, parent)
-                    / wholly_refining_ms(frame, parent)
-            }
+            Some(parent) => self.worth.away(frame, parent, &self.options),
             None => f64::MAX,
         }
     }
