@@ -20,17 +20,17 @@ use crate::builder::cut::split::Chunk;
 use crate::builder::emit::disk_sink::{NodeRecord, file_name};
 use crate::builder::hierarchy::{Forest, HierarchyOptions, LeftOut, Resolutions, Tree};
 use crate::builder::options::BuildOptions;
-use crate::builder::progress::Progress;
 use crate::builder::simplify::aggregate::BodyRules;
 use crate::builder::stages::{Stage, Stages};
 use crate::builder::stitch::{Stitch, stitches};
 use crate::builder::threads::in_parallel;
-use crate::format::{BlockInfo, OutputDir};
+use crate::builder::tiles::border::InputBorder;
+use crate::format::BlockInfo;
 use crate::lattice::Lattice;
 use crate::lattice::Quantization;
 use crate::mesh::{Material, Model, Part, PositionKey, UpAxis, Warnings, key};
 use crate::report::build_report::{BlockCut, LeftOutNode};
-use crate::texture::{SharedTextures, TextureCache};
+use crate::texture::TextureCache;
 
 /// A block whose nodes are written.
 #[derive(Debug)]
@@ -112,21 +112,13 @@ impl DraftSource {
 pub fn build_input(
     mut model: Model,
     up: UpAxis,
-    options: &BuildOptions,
-    out: &OutputDir,
-    shared: &SharedTextures,
-    stages: &Stages,
-    progress: &dyn Progress,
+    border: &InputBorder,
+    target: Target,
 ) -> Result<BuiltInput> {
+    let Target { options, stages, progress, .. } = target;
     let mut warnings = std::mem::take(&mut model.warnings);
     let quantization = options.quantization();
-    if let Some(quantization) = quantization {
-        let collapsed = stages.time(Stage::Gather, || quantization.snap(&mut model));
-        let (source, step) = (model.source.display(), quantization.step);
-        let what = format!("{source}: triangle thinner than the lattice of {step} m left out");
-        warnings.add(what, collapsed);
-        progress.built(collapsed);
-    }
+    let of_tile = border.bounds.map(|_| Lattice::for_tile(model.bounds()));
     merge_untextured(&mut model);
     let HierarchyOptions { desired_tris, constants, .. } = &options.hierarchy;
     let looks = Looks::new(&model, options.hierarchy.seams);
@@ -140,9 +132,10 @@ pub fn build_input(
     let plans = plan(&model, options.blocks, *desired_tris, &stitches, &constants.blocks, &rules);
     let stitched_edges = stitches.len() as u64;
     let (stitches, across) = by_plan(&plans, stitches, model.parts.len());
-    let drafts = drafts(&mut model, plans, stitches, options, &rules, stages);
+    let drafts = drafts(&mut model, plans, stitches, border, options, &rules, stages);
     let lattice_of = |drafts: &mut dyn Iterator<Item = &Draft>| {
         let fine = lattice_of(drafts);
+        let fine = of_tile.map_or(fine, |of_tile| fine.coarser(of_tile));
         if let Some(Quantization { step }) = quantization.filter(|coarse| coarse.step < fine.step) {
             let what = format!(
                 "{}: blocks too large for steps of {step} m; rounded to {} m",
@@ -157,7 +150,7 @@ pub fn build_input(
     if let Some(what) = coarse {
         warnings.add(what, 1);
     }
-    let cuts = cuts(&drafts, common);
+    let cuts = cuts(&drafts, border, common);
     let shared_vertices = stages.time(Stage::Gather, || {
         let bounds: Vec<_> = drafts.iter().map(|draft| draft.source.bounds()).collect();
         let mut shared = shared_positions(&bounds, |block| drafts[block].source.uncut_positions());
@@ -170,7 +163,6 @@ pub fn build_input(
         drafts.iter().map(|draft| draft.materials.iter().copied()),
     );
     let prefix = file_prefix(&model.source);
-    let target = Target { options, out, shared, stages, progress };
     let setup = BlockSetup::new(target, up, &cache, &extrudable);
     let built = in_parallel(drafts, |number, draft| {
         let (lattice, coarse) =
@@ -180,7 +172,11 @@ pub fn build_input(
         let origin = lattice.origin_near(std::array::from_fn(|i| (low[i] + high[i]) * 0.5));
         let (chunk, collapsed) = stages.time(Stage::Gather, || {
             let mut chunk = match source {
-                DraftSource::Parts(parts, stitches) => gather(&model.materials, &parts, &stitches),
+                DraftSource::Parts(parts, stitches) => {
+                    let mut chunk = gather(&model.materials, &parts, &stitches);
+                    border.mark(&mut chunk);
+                    chunk
+                }
                 DraftSource::Chunk(chunk) => *chunk,
             };
             keep_shared(&mut chunk, &shared_vertices);
@@ -232,20 +228,19 @@ pub fn build_input(
     Ok(BuiltInput { blocks, left_out, used_texels, stitched_edges, cuts, warnings })
 }
 
-/// The planes that divided drafts, as their nodes have them.
-fn cuts(drafts: &[Draft], lattice: Lattice) -> Vec<BlockCut> {
+/// The planes that divided drafts and those along which they meet other inputs, as their nodes have them.
+fn cuts(drafts: &[Draft], border: &InputBorder, lattice: Lattice) -> Vec<BlockCut> {
     let chunks = drafts.iter().filter_map(|draft| match &draft.source {
         DraftSource::Chunk(chunk) => Some(chunk),
         DraftSource::Parts(..) => None,
     });
     let planes =
         chunks.flat_map(|chunk| (0..chunk.path.len() as u32).map(|bit| chunk.path.plane(bit)));
+    let planes = planes.filter(|plane| !is_of_shared(plane));
     let mut cuts: Vec<BlockCut> = planes
-        .filter(|plane| !is_of_shared(plane))
-        .map(|plane| BlockCut {
-            axis: plane.axis,
-            coordinate: lattice.round(plane.coordinate) + 0.0,
-        })
+        .map(|plane| (plane.axis, plane.coordinate))
+        .chain(border.planes())
+        .map(|(axis, coordinate)| BlockCut { axis, coordinate: lattice.round(coordinate) + 0.0 })
         .collect();
     cuts.sort_by(|a, b| a.axis.cmp(&b.axis).then(a.coordinate.total_cmp(&b.coordinate)));
     cuts.dedup();
@@ -278,6 +273,7 @@ fn drafts(
     model: &mut Model,
     plans: Vec<BlockPlan>,
     stitches: Vec<Vec<Stitch>>,
+    border: &InputBorder,
     options: &BuildOptions,
     rules: &BodyRules,
     stages: &Stages,
@@ -298,7 +294,7 @@ fn drafts(
         false => FxHashSet::default(),
     };
     let materials = &model.materials;
-    let drafting = Drafting { materials, shared: &shared, options, rules, stages };
+    let drafting = Drafting { materials, shared: &shared, border, options, rules, stages };
     let drafts_of = |((plan, parts), stitches)| drafting.drafts(plan, parts, stitches);
     let drafts: Vec<Vec<Draft>> = planned.into_par_iter().zip(stitches).map(drafts_of).collect();
     drafts.into_iter().flatten().collect()
@@ -319,6 +315,7 @@ struct Drafting<'a> {
     materials: &'a [Material],
     /// Positions that several plans use.
     shared: &'a FxHashSet<PositionKey<f64>>,
+    border: &'a InputBorder,
     options: &'a BuildOptions,
     rules: &'a BodyRules<'a>,
     stages: &'a Stages,
@@ -326,7 +323,7 @@ struct Drafting<'a> {
 
 impl Drafting<'_> {
     fn drafts(&self, plan: BlockPlan, parts: Vec<Part>, stitches: Vec<Stitch>) -> Vec<Draft> {
-        let &Self { materials, shared, options, rules, stages } = self;
+        let &Self { materials, shared, border, options, rules, stages } = self;
         let BlockPlan { name, divide: division, .. } = plan;
         let mut drafts = Vec::new();
         let stray = stages.time(Stage::Gather, || set_outliers_aside(&parts));
@@ -350,6 +347,7 @@ impl Drafting<'_> {
         let mut chunk = stages.time(Stage::Gather, || gather(materials, &parts, &stitches));
         drop(stitches);
         drop(parts);
+        border.mark(&mut chunk);
         keep_shared(&mut chunk, shared);
         chunk.moved = options.quantize.map(|_| vec![0.0; chunk.mesh.positions.len()]);
         let most = match division {

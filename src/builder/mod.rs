@@ -1,10 +1,11 @@
 //! From imported models to nodes on disk.
 //!
-//! - [`pipeline`]: the whole build; [`block`]: one input to the trees of its blocks
+//! - [`pipeline`]: the whole build; [`mod@prepare`]: an input as it is built; [`block`]: to the trees of its blocks
 //! - [`subset`] and [`merge`]: shares of a build for several machines, and one result of all of them
 //! - [`districts`]: nodes above the blocks, made from these nodes' files
 //! - [`blocks`]: what a block is: groups merged, divided and gathered
 //! - [`stitch`]: borders of the source that touch without sharing vertices
+//! - [`tiles`]: inputs that touch, and how they meet
 //! - [`hierarchy`]: the tree of one block
 //! - [`cut`]: planes, and the triangles that cross them
 //! - [`border`]: what planes leave behind: thinning, skirts, caps
@@ -28,6 +29,8 @@ pub mod memory;
 pub mod merge;
 pub mod options;
 pub mod pipeline;
+pub mod plan;
+pub mod prepare;
 pub mod progress;
 pub mod reuse;
 pub mod simplify;
@@ -35,6 +38,7 @@ pub mod stages;
 pub mod stitch;
 pub mod subset;
 pub mod threads;
+pub mod tiles;
 pub mod up;
 
 pub use options::BuildOptions;

@@ -6,32 +6,35 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::builder::block::{BuiltBlock, build_input};
+use crate::builder::block_setup::Target;
 use crate::builder::districts::{Above, Districts, build_districts};
 use crate::builder::emit::disk_sink::{NodeRecord, check_unique};
 use crate::builder::emit::forest::{append_nodes, make_errors_monotone, set_block};
 use crate::builder::emit::shared_textures::write_textures;
 use crate::builder::hierarchy::Tree;
-use crate::builder::inputs::{describe, fingerprint, text_of, unchanged};
+use crate::builder::inputs::{describe, fingerprint, text_of};
 use crate::builder::merge::Subsets;
 use crate::builder::options::BuildOptions;
+use crate::builder::plan::Plan;
+use crate::builder::prepare::{Prepared, Preparing};
 use crate::builder::progress::Progress;
 use crate::builder::reuse::Earlier;
 use crate::builder::simplify::ladder::BUDGET_TOLERANCE;
 use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::{Stage, Stages};
 use crate::builder::subset::Subset;
-use crate::cpu_time::CpuTime;
+use crate::builder::tiles::border::InputBorder;
 use crate::format::{
     BlockInfo, Node, OutputDir, REPORT_FILE, SCENE_FILE, SUBSETS_DIR, Scene, SharedTexture,
     check_apart, fits_in_steps,
 };
 use crate::lattice::Quantization;
-use crate::mesh::{Model, UpAxis, Warnings};
+use crate::mesh::{UpAxis, Warnings};
+use crate::place::Globe;
 use crate::place::placement_of;
-use crate::place::{Globe, z_up};
 use crate::report::build_report::{
     Baked, BlockCut, BuildReport, Count, FileReport, InputReport, OverBudget, Quantized,
-    SharedTexturesReport, StageReport, SubsetReport, UpFrom, level_reports,
+    SharedTexturesReport, StageReport, SubsetReport, level_reports,
 };
 use crate::texture::{BakeReason, SharedTextures};
 use crate::{Error, Result, import, tileset};
@@ -82,8 +85,9 @@ pub fn merge_subsets(out: &Path, progress: &dyn Progress) -> Result<BuildReport>
     let parameters = subsets.parameters().clone();
     let options = BuildOptions::from_json(&parameters)?;
     let output = OutputDir::create(out)?;
+    let globe = options.placement.globe()?;
     let run = Run {
-        globe: options.placement.globe()?,
+        globe: globe.as_ref(),
         options: &options,
         output: &output,
         shared: SharedTextures::new(),
@@ -132,13 +136,10 @@ fn run(
     // What a subset has not built before may be in the result of a merge.
     let open = |dir: &Path| Earlier::open(dir, &parameters);
     let earlier = if options.force { None } else { open(&target).or_else(|| open(out)) };
-    let still_good: Vec<Option<InputReport>> = stages.time(Stage::Compare, || {
-        let same = |input: &PathBuf| {
-            let report = earlier.as_ref()?.input(&text_of(input))?;
-            unchanged(report).then(|| report.clone())
-        };
-        inputs.iter().map(same).collect()
-    });
+    let preparing =
+        Preparing { options, globe: globe.as_ref(), stages: &stages, inputs: all_inputs.len() };
+    let Plan { still_good, borders } =
+        Plan::new(&all_inputs, &inputs, earlier.as_ref(), &preparing, progress)?;
     if let Some(earlier) = &earlier
         && still_good.iter().all(Option::is_some)
         && earlier.report.inputs.len() == inputs.len()
@@ -151,13 +152,13 @@ fn run(
     let output = OutputDir::create(&target)?;
     let run = Run {
         options,
-        globe,
+        globe: globe.as_ref(),
         output: &output,
         shared: SharedTextures::new(),
         stages: &stages,
         progress,
     };
-    let done = run.inputs(&inputs, all_inputs.len(), &still_good, earlier.as_ref())?;
+    let done = run.inputs(&inputs, &still_good, borders, earlier.as_ref(), &preparing)?;
     progress.finishing();
     let report = run.finish(done, earlier.as_ref(), parameters, part, begin)?;
     output.commit()?;
@@ -167,7 +168,7 @@ fn run(
 /// What all steps of a build share.
 struct Run<'a> {
     options: &'a BuildOptions,
-    globe: Option<Globe>,
+    globe: Option<&'a Globe>,
     output: &'a OutputDir,
     shared: SharedTextures,
     stages: &'a Stages,
@@ -196,28 +197,31 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Builds inputs one after another, of so many in all, or takes over what `still_good` says of them.
+    /// Builds inputs one after another, with these borders, or takes over what `still_good` says of them.
     fn inputs(
         &self,
         inputs: &[PathBuf],
-        all: usize,
         still_good: &[Option<InputReport>],
+        borders: Vec<InputBorder>,
         earlier: Option<&Earlier>,
+        preparing: &Preparing,
     ) -> Result<Done> {
         let mut done = Done::default();
-        let mut ahead: Option<Result<Model>> = None;
-        for (number, input) in inputs.iter().enumerate() {
+        let mut ahead: Option<Result<Prepared>> = None;
+        for (number, (input, border)) in inputs.iter().zip(borders).enumerate() {
             if let (Some(report), Some(earlier)) = (&still_good[number], earlier) {
                 self.take_over(report, earlier, &mut done)?;
                 continue;
             }
             self.progress.reading(input, number + 1, inputs.len());
-            let model = ahead.take().unwrap_or_else(|| self.load(input))?;
+            let model = ahead.take().unwrap_or_else(|| preparing.read(input))?;
             // Only the input that comes next in turn, and only where both fit in memory.
             let is_next = still_good.get(number + 1).is_some_and(Option::is_none);
             let next = inputs.get(number + 1).filter(|next| is_next && fits_beside(input, next));
-            let (built, read_ahead) =
-                rayon::join(|| self.input(input, model, all), || next.map(|next| self.load(next)));
+            let (built, read_ahead) = rayon::join(
+                || self.input(input, model, border),
+                || next.map(|next| preparing.read(next)),
+            );
             ahead = read_ahead;
             let (blocks, report) = built?;
             done.blocks.extend(blocks);
@@ -226,41 +230,21 @@ impl Run<'_> {
         Ok(done)
     }
 
-    fn load(&self, input: &Path) -> Result<Model> {
-        let cpu_time = CpuTime::default();
-        let model = import::load_timed(input, &cpu_time);
-        self.stages.add(Stage::Import, cpu_time.total());
-        model
-    }
-
-    /// Builds one of so many inputs.
+    /// Builds one input.
     fn input(
         &self,
         input: &Path,
-        mut model: Model,
-        inputs: usize,
+        prepared: Prepared,
+        border: InputBorder,
     ) -> Result<(Vec<BuiltBlock>, InputReport)> {
         let &Self { options, output, stages, progress, .. } = self;
+        let Prepared { model, up, up_from, triangles, collapsed } = prepared;
         let dependencies = model.dependencies.clone();
-        let triangles = model.triangle_count() as u64;
         progress.found(triangles);
-        let (up, up_from) = match (options.up, model.up) {
-            (Some(up), _) => (up, UpFrom::Option),
-            (None, Some(up)) => (up, UpFrom::Format),
-            // Degrees beside metres have no shape.
-            (None, None) if options.placement.is_degrees() => (UpAxis::Z, UpFrom::Degrees),
-            (None, None) => (crate::builder::up::guess(&model), UpFrom::Shape),
-        };
-        options.placement.localise(&mut model, up)?;
-        check_place(&model, up, self.globe.as_ref())?;
-        if let Some(quantization) = options.quantization() {
-            quantization.check(&model)?;
-            if inputs == 1 {
-                quantization.check_extent(model.bounds())?;
-            }
-        }
+        progress.built(collapsed);
+        let target = Target { options, out: output, shared: &self.shared, stages, progress };
         let (built, files) = rayon::join(
-            || build_input(model, up, options, output, &self.shared, stages, progress),
+            || build_input(model, up, &border, target),
             || describe(&dependencies, stages),
         );
         let (built, files) = (built?, files?);
@@ -273,6 +257,8 @@ impl Run<'_> {
             texels: built.used_texels,
             stitched_edges: built.stitched_edges,
             cuts: built.cuts,
+            bounds: border.bounds,
+            meetings: border.meetings,
             up,
             up_from: Some(up_from),
             outcomes,
@@ -295,7 +281,7 @@ impl Run<'_> {
         let source_texels = reports.iter().map(|input| input.texels).sum::<u64>()
             + self.shared.source_texels()
             + repeating_texels;
-        let mut warnings = warnings(&reports, earlier, self.globe.as_ref());
+        let mut warnings = warnings(&reports, earlier, self.globe);
         let mut shared_textures = write_textures(self.shared, reused_textures, self.output)?;
         let up = agreed_up(&reports, &mut warnings);
         let (infos, trees) = numbered(blocks);
@@ -305,8 +291,16 @@ impl Run<'_> {
                     let Self { options, output, stages, progress, .. } = self;
                     let cuts: Vec<BlockCut> =
                         reports.iter().flat_map(|input| input.cuts.iter().copied()).collect();
-                    let above =
-                        Above { options, out: output, stages, progress, earlier, up, cuts: &cuts };
+                    let above = Above {
+                        options,
+                        out: output,
+                        stages,
+                        progress,
+                        earlier,
+                        up,
+                        cuts: &cuts,
+                        meet: reports.iter().any(|input| !input.meetings.is_empty()),
+                    };
                     build_districts(trees, &mut shared_textures, &above)?
                 }
                 false => Districts { trees, ..Districts::default() },
@@ -391,17 +385,6 @@ fn quantized(scene: &Scene, quantization: Quantization) -> Quantized {
         step_metres: step,
         bound_metres: quantization.bound(),
         large_nodes: scene.nodes.iter().filter(is_large).count() as u64,
-    }
-}
-
-/// Refuses coordinates that cannot be of the place that was asked for.
-fn check_place(model: &Model, up: UpAxis, globe: Option<&Globe>) -> Result<()> {
-    let Some(globe) = globe else { return Ok(()) };
-    let [low, high] = model.bounds();
-    let (low, high) = z_up(up, low, high);
-    match globe.misfit(low, high) {
-        Some(what) => Err(Error::input(&model.source, what)),
-        None => Ok(()),
     }
 }
 

@@ -6,6 +6,7 @@
 //! and no triangle is degenerate or there twice. What had to be repaired is counted in
 //! [`Model::warnings`]; what cannot be read at all is an [`Error::Input`].
 
+mod bounds;
 mod clean;
 mod find;
 mod gltf;
@@ -26,6 +27,7 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::Path;
 
+pub use bounds::bounds;
 pub use find::find_inputs;
 
 use glam::DVec3;

@@ -12,7 +12,7 @@
 //! hashes each corner, makes triangles of polylines, gives faces without texture coordinates those
 //! of the face before, and cannot say in which line an error is.
 
-mod chunks;
+pub(super) mod chunks;
 mod corners;
 mod statements;
 

@@ -5,6 +5,7 @@ mod coordinate;
 mod disjoint_set;
 mod material;
 mod model;
+mod near;
 mod outline;
 mod polygon;
 mod surface;
@@ -14,6 +15,7 @@ pub use coordinate::{Coordinate, Key, PositionKey, color_key, key, texcoord_key,
 pub(crate) use disjoint_set::DisjointSet;
 pub use material::{AlphaMode, Material, TextureData, TextureSource, Wrap};
 pub use model::{Group, Model, Part, UpAxis, Warnings};
+pub use near::{NEAR, NearVertices};
 pub use outline::{Kept, Outline, OutlineFrame};
 pub(crate) use polygon::Triangulator;
 pub(crate) use surface::Surface;

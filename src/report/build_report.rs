@@ -98,6 +98,13 @@ pub struct InputReport {
     /// Where planes divided it into blocks, in order: there its districts may meet.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cuts: Vec<BlockCut>,
+    /// Least and greatest coordinates of its vertices, as its file has them; `None` where it is the only
+    /// input.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bounds: Option<[[f64; 3]; 2]>,
+    /// The inputs that it touches, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub meetings: Vec<MeetingReport>,
     /// Which of its axes points at the sky.
     pub up: UpAxis,
     /// How that is known; `None` in results of versions that did not say.
@@ -112,7 +119,17 @@ pub struct InputReport {
     pub warnings: Vec<Count>,
 }
 
-/// A plane that divided an input into blocks.
+/// Another input that an input touches.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MeetingReport {
+    /// The other input.
+    pub path: String,
+    /// A hash of what both have in common, as this one has it: while it is the same, the input need not be
+    /// built again.
+    pub hash: String,
+}
+
+/// A plane that divided an input into blocks, or along which it touches another.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlockCut {
     /// The axis that it is across: 0, 1 or 2.

@@ -94,8 +94,12 @@ mod tests {
     /// Seams along x from 0 to 4, and what a node with triangles over some of their ends has.
     fn kept_by(triangles: &[[u32; 3]]) -> Vec<bool> {
         let position = |x: u32| DVec3::new(f64::from(x), 0.0, 0.0);
-        let seams: Vec<Seam> =
-            (0..4).map(|x| Seam { ends: [position(x), position(x + 1)], leaves: [0, 1] }).collect();
+        let seams: Vec<Seam> = (0..4)
+            .map(|x| {
+                let ends = [position(x), position(x + 1)];
+                Seam { ends, leaves: [0, 1], other_ends: ends }
+            })
+            .collect();
         // Vertex 5 lies beside the seam.
         let mut positions: Vec<[f32; 3]> = (0..5).map(|x| [x as f32, 0.0, 0.0]).collect();
         positions.push([2.0, 1.0, 0.0]);

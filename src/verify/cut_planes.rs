@@ -42,9 +42,11 @@ pub(super) fn mark(
         }
         for ([a, b], seams) in pairs {
             let nodes = [a, b].map(|leaf| &scene.nodes[leaf as usize]);
-            if let Some(plane) = plane_between(&seams, nodes, steps[a as usize]) {
-                for node in apart(scene, a, b).concat() {
-                    planes[node as usize].insert(plane);
+            if let Some((axis, coordinates)) = plane_between(&seams, nodes, steps[a as usize]) {
+                for (line, coordinate) in apart(scene, a, b).into_iter().zip(coordinates) {
+                    for node in line {
+                        planes[node as usize].insert((axis, coordinate));
+                    }
                 }
             }
         }
@@ -72,20 +74,23 @@ fn lies_in(corners: [DVec3; 3], &(axis, bits): &Plane, step: f64) -> bool {
         && corners.iter().all(|corner| (corner[axis] - coordinate).abs() <= beside)
 }
 
-/// The plane that holds most of the edges between two leaves and separates their boxes' middles.
-fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<Plane> {
-    let mut best: Option<(f64, Plane)> = None;
+/// The plane that holds most of the edges between two leaves and separates their boxes' middles: its axis, and
+/// its coordinate as each of them has it.
+fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<(usize, [u64; 2])> {
+    let mut best: Option<(f64, (usize, [u64; 2]))> = None;
     for axis in 0..3 {
         let middle = |node: &Node| (node.bbox_min[axis] + node.bbox_max[axis]) * 0.5;
         let (low, high) = if middle(a) <= middle(b) { (a, b) } else { (b, a) };
-        let mut counts: BTreeMap<u64, usize> = BTreeMap::new();
+        let mut counts: BTreeMap<u64, (usize, u64)> = BTreeMap::new();
         for seam in seams {
             let [from, to] = seam.ends.map(|end| end[axis] + 0.0);
             if from == to {
-                *counts.entry(from.to_bits()).or_default() += 1;
+                let other = (seam.other_ends[0][axis] + 0.0).to_bits();
+                counts.entry(from.to_bits()).or_insert((0, other)).0 += 1;
             }
         }
-        let Some((&bits, &count)) = counts.iter().max_by_key(|&(_, &count)| count) else {
+        let Some((&bits, &(count, other))) = counts.iter().max_by_key(|(_, (count, _))| *count)
+        else {
             continue;
         };
         // Vertices near the plane count as on it, so a few edges lie beside it, and small bodies
@@ -97,7 +102,7 @@ fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<Plane
         let between = middle(low) < coordinate - slack && middle(high) > coordinate + slack;
         let apart = middle(high) - middle(low);
         if between && 2 * count >= seams.len() && best.is_none_or(|(most, _)| apart > most) {
-            best = Some((apart, (axis, bits)));
+            best = Some((apart, (axis, [bits, other])));
         }
     }
     best.map(|(_, plane)| plane)
@@ -118,13 +123,14 @@ mod tests {
         let seam = |from: [f64; 3], to: [f64; 3]| Seam {
             ends: [DVec3::from(from), DVec3::from(to)],
             leaves: [0, 1],
+            other_ends: [DVec3::from(from), DVec3::from(to)],
         };
         let flat = [node([0.0; 3], [5.0, 9.0, 0.0]), node([5.0, 0.0, 0.0], [11.0, 9.0, 0.0])];
         let seams =
             [seam([5.0, 0.0, 0.0], [5.0, 4.0, 0.0]), seam([5.0, 4.0, 0.0], [5.0, 9.0, 0.0])];
         let seams: Vec<&Seam> = seams.iter().collect();
         let found = plane_between(&seams, [&flat[0], &flat[1]], 1e-6);
-        assert_eq!(found, Some((0, 5f64.to_bits())), "not z = 0, where all is");
+        assert_eq!(found, Some((0, [5f64.to_bits(); 2])), "not z = 0, where all is");
         let beside = seam([5.01, 0.0, 0.0], [5.02, 4.0, 1.0]);
         assert_eq!(plane_between(&[&beside], [&flat[0], &flat[1]], 1e-6), None);
     }
@@ -149,8 +155,11 @@ mod tests {
             node(Some(2), None, None, 5.0, 11.0),
         ];
         let scene = Scene { nodes, ..scene() };
-        let seams =
-            [Seam { ends: [DVec3::new(5.0, 0.0, 0.0), DVec3::new(5.0, 9.0, 0.0)], leaves: [3, 4] }];
+        let seams = [Seam {
+            ends: [DVec3::new(5.0, 0.0, 0.0), DVec3::new(5.0, 9.0, 0.0)],
+            leaves: [3, 4],
+            other_ends: [DVec3::new(5.0, 0.0, 0.0), DVec3::new(5.0, 9.0, 0.0)],
+        }];
         let floor = |x: f32| [[x, 0.0, 0.0], [x + 5.0, 0.0, 0.0], [x + 5.0, 9.0, 0.0]];
         let upright = [[5.0, 0.0, 1.0], [5.0, 9.0, 1.0], [5.0, 9.0, 3.0], [5.0, 0.0, 3.0]];
         let geometry_of = |parts: &[&[[f32; 3]]]| {

@@ -29,7 +29,7 @@ use super::report::{Check, Failure, GapFigures};
 use super::seams::{Seam, rim};
 use super::tree::{apart, input_of, is_leaf, line};
 use crate::format::Scene;
-use crate::mesh::Surface;
+use crate::mesh::{NEAR, Surface};
 
 /// Where along an edge of the seam gaps are measured.
 const PLACES: [f64; 3] = [0.0, 0.5, 1.0];
@@ -185,7 +185,9 @@ impl SeamCheck<'_> {
                 }
                 let level = |node: u32| scene.nodes[node as usize].level;
                 let error = |node: u32| scene.nodes[node as usize].geometric_error;
-                let tolerance = limits.gap_steps * steps[a as usize].max(steps[b as usize]);
+                // Where inputs nearly agree, districts join what each of them keeps as it is.
+                let apart = if seam.apart() > 0.0 { seam.apart() + NEAR } else { 0.0 };
+                let tolerance = limits.gap_steps * steps[a as usize].max(steps[b as usize]) + apart;
                 let same_level = level(a) == level(b);
                 let error = error(a).max(error(b));
                 let levels = [level(a).min(level(b)), level(a).max(level(b))];
@@ -209,7 +211,6 @@ impl SeamCheck<'_> {
                     }
                     if input != other_input {
                         found.between_inputs = found.between_inputs.max(open);
-                        continue;
                     }
                     let figures = found.pairs.entry(levels).or_default();
                     let left_out =

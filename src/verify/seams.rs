@@ -3,14 +3,16 @@
 //! Positions at both sides of a cut are equal in every bit, so equal edges are found by sorting.
 //! Where two blocks of the source touch in the same way, their common edges count too.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::geometry::NodeGeometry;
 use super::tree::input_of;
 use crate::format::Scene;
-use crate::mesh::{PositionKey, key};
+use crate::mesh::{NEAR, NearVertices, PositionKey, key};
 
 /// An edge that two leaves share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,12 +21,20 @@ pub(super) struct Seam {
     pub ends: [DVec3; 2],
     /// The leaves, the lower number first.
     pub leaves: [u32; 2],
+    /// Its ends as the second leaf has them: the same but between inputs that nearly agree.
+    pub other_ends: [DVec3; 2],
 }
 
 impl Seam {
     /// Its length, metres.
     pub fn length(&self) -> f64 {
         self.ends[0].distance(self.ends[1])
+    }
+
+    /// How far its ends are apart as the two leaves have them, at most; metres.
+    pub fn apart(&self) -> f64 {
+        let apart = |end: usize| self.ends[end].distance(self.other_ends[end]);
+        apart(0).max(apart(1))
     }
 }
 
@@ -93,19 +103,65 @@ pub(super) fn open_edges(
     rim.into_iter().filter(|edge| edge.uses % 2 == 1).map(|edge| edge.ends).collect()
 }
 
+/// Gives vertices of different inputs that may be one the same key: that of the input that comes first.
+/// Returns the keys of those that are not at one place.
+fn join_inputs<'a>(
+    edges: &mut [(RimEdge, u32)],
+    input_of: impl Fn(u32) -> Option<&'a str>,
+) -> FxHashSet<PositionKey<f64>> {
+    let mut of_inputs: BTreeMap<Option<&str>, Vec<[[f64; 3]; 2]>> = BTreeMap::new();
+    for (edge, leaf) in edges.iter().filter(|(edge, _)| edge.uses % 2 == 1) {
+        of_inputs.entry(input_of(*leaf)).or_default().push(edge.ends.map(|end| end.to_array()));
+    }
+    let mut apart = FxHashSet::default();
+    if of_inputs.len() < 2 {
+        return apart;
+    }
+    let vertices = |(input, edges): (Option<&'a str>, Vec<[[f64; 3]; 2]>)| {
+        (input, NearVertices::new(edges.into_iter(), NEAR))
+    };
+    let inputs: Vec<_> = of_inputs.into_iter().map(vertices).collect();
+    let mut joined: FxHashMap<(Option<&str>, PositionKey<f64>), PositionKey<f64>> =
+        FxHashMap::default();
+    for (number, (input, vertices)) in inputs.iter().enumerate() {
+        for (first, before) in inputs[..number].iter().filter(|(_, other)| vertices.meet(other)) {
+            for ([own, other], distance) in vertices.pairs(before) {
+                let own = key(vertices.positions()[own as usize]);
+                let other = key(before.positions()[other as usize]);
+                let other = joined.get(&(*first, other)).copied().unwrap_or(other);
+                joined.entry((*input, own)).or_insert(other);
+                if distance > 0.0 {
+                    apart.insert(other);
+                }
+            }
+        }
+    }
+    for (edge, leaf) in edges {
+        let input = input_of(*leaf);
+        edge.keys = edge.keys.map(|own| joined.get(&(input, own)).copied().unwrap_or(own));
+        if edge.keys[1] < edge.keys[0] {
+            edge.keys.reverse();
+            edge.ends.reverse();
+        }
+    }
+    apart
+}
+
 /// The rims of all leaves, equal edges side by side, in a fixed order.
-pub(super) struct Rims<'a> {
-    scene: &'a Scene,
+pub(super) struct Rims {
+    /// Vertices of several inputs that are not at one place.
+    apart: FxHashSet<PositionKey<f64>>,
     edges: Vec<(RimEdge, u32)>,
 }
 
-impl<'a> Rims<'a> {
+impl Rims {
     /// Of these leaves.
-    pub fn new(scene: &'a Scene, leaves: &[u32], geometry: &[NodeGeometry]) -> Self {
+    pub fn new(scene: &Scene, leaves: &[u32], geometry: &[NodeGeometry]) -> Self {
         let rim = |&leaf: &u32| rim(&geometry[leaf as usize]).into_iter().map(move |e| (e, leaf));
         let mut edges: Vec<(RimEdge, u32)> = leaves.par_iter().flat_map_iter(rim).collect();
+        let apart = join_inputs(&mut edges, |leaf| input_of(scene, leaf));
         edges.par_sort_unstable_by_key(|&(edge, leaf)| (edge.keys, leaf));
-        Self { scene, edges }
+        Self { apart, edges }
     }
 
     fn equal(&self) -> impl Iterator<Item = &[(RimEdge, u32)]> {
@@ -118,7 +174,11 @@ impl<'a> Rims<'a> {
         for same in self.equal() {
             for (index, &(edge, a)) in same.iter().enumerate() {
                 let others = same[index + 1..].iter().filter(|&&(_, b)| a != b);
-                seams.extend(others.map(|&(_, b)| Seam { ends: edge.ends, leaves: [a, b] }));
+                seams.extend(others.map(|&(other, b)| Seam {
+                    ends: edge.ends,
+                    leaves: [a, b],
+                    other_ends: other.ends,
+                }));
             }
         }
         seams
@@ -142,27 +202,25 @@ impl<'a> Rims<'a> {
         for (edge, leaf) in alone() {
             let [from, to] = edge.keys.map(|end| &leaves_at[&end]);
             let others = from.iter().filter(|&&other| other != leaf && to.contains(&other));
-            let seam =
-                |&other: &u32| Seam { ends: edge.ends, leaves: [leaf.min(other), leaf.max(other)] };
+            // As far as they may be, where they are not at one place.
+            let is_apart = edge.keys.iter().any(|end| self.apart.contains(end));
+            let off = if is_apart { DVec3::X * NEAR } else { DVec3::ZERO };
+            let seam = |&other: &u32| Seam {
+                ends: edge.ends,
+                leaves: [leaf.min(other), leaf.max(other)],
+                other_ends: edge.ends.map(|end| end + off),
+            };
             seams.extend(others.map(seam));
         }
         seams
     }
 
-    /// The edges at which the leaves of an input end, all together, and a leaf that has each.
+    /// The edges at which the leaves end, all together, and a leaf that has each.
     pub fn open(&self) -> Vec<([DVec3; 2], u32)> {
-        let mut open = Vec::new();
-        for same in self.equal() {
-            for &(edge, leaf) in same.iter().filter(|(edge, _)| edge.uses % 2 == 1) {
-                let input = input_of(self.scene, leaf);
-                let of_input =
-                    same.iter().filter(|&&(_, other)| input_of(self.scene, other) == input);
-                if of_input.map(|(edge, _)| edge.uses).sum::<u32>() % 2 == 1 {
-                    open.push((edge.ends, leaf));
-                }
-            }
-        }
-        open
+        let is_open =
+            |same: &&[(RimEdge, u32)]| same.iter().map(|(edge, _)| edge.uses).sum::<u32>() % 2 == 1;
+        let open = self.equal().filter(is_open).flatten();
+        open.filter(|(edge, _)| edge.uses % 2 == 1).map(|&(edge, leaf)| (edge.ends, leaf)).collect()
     }
 }
 
@@ -194,7 +252,10 @@ mod tests {
         scene.nodes.iter_mut().for_each(|node| node.block = Some(0));
         let rims = Rims::new(&scene, &[0, 1, 2], &nodes);
         let x = DVec3::new(101.0, 0.0, 0.0);
-        assert_eq!(rims.seams(), [Seam { ends: [x, x + DVec3::Y], leaves: [0, 1] }]);
+        assert_eq!(
+            rims.seams(),
+            [Seam { ends: [x, x + DVec3::Y], leaves: [0, 1], other_ends: [x, x + DVec3::Y] }]
+        );
         // Three squares have twelve sides; two of them meet.
         let open = rims.open();
         assert_eq!(open.len(), 10);
@@ -215,15 +276,16 @@ mod tests {
         let rims = Rims::new(&scene, &[0, 1], &nodes);
         assert_eq!(rims.seams(), []);
         let ends = [x, x + DVec3::Y * 2.0];
-        assert_eq!(rims.between_vertices(), [Seam { ends, leaves: [0, 1] }]);
-        let nodes = [square(100.0, 0.0), square(101.0, 0.0), square(102.0, 0.5)];
+        assert_eq!(rims.between_vertices(), [Seam { ends, leaves: [0, 1], other_ends: ends }]);
 
-        // Two inputs that touch end there, each for itself.
+        // Two inputs meet where they agree to millimetres; one does not.
+        let nodes = [square(100.0, 0.0), square(101.003, 0.0)];
+        assert_eq!(Rims::new(&scene, &[0, 1], &nodes).seams(), []);
         scene.blocks[1].input = "other.obj".into();
         scene.nodes[1].block = Some(1);
-        assert_eq!(
-            Rims::new(&scene, &[1, 2], &[&nodes[..1], &nodes[..2]].concat()).open().len(),
-            8
-        );
+        let rims = Rims::new(&scene, &[0, 1], &nodes);
+        let [seam] = rims.seams()[..] else { panic!("{:?}", rims.seams()) };
+        assert!((seam.apart() - 0.003).abs() < 1e-9 && seam.leaves == [0, 1], "{seam:?}");
+        assert_eq!(rims.open().len(), 6);
     }
 }

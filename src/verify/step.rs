@@ -12,7 +12,8 @@ use crate::lattice::Quantization;
 ///
 /// A quantised build's step is among the parameters. Otherwise, or where blocks are too large for
 /// that, it is not stored. It follows from the largest extent of a block and the largest
-/// coordinate of an input, as [`Lattice::for_extent`] says; a block of strays has its own. Where
+/// coordinate of an input, as [`Lattice::for_extent`] says, and where there are several inputs from all of
+/// each ([`Lattice::for_tile`]); a block of strays has its own. Where
 /// an extent is a power of two to a millionth, the result may be twice the real step. Districts of one
 /// level have one lattice; all are taken to have that of the largest.
 pub(super) fn steps(scene: &Scene) -> Vec<f64> {
@@ -71,6 +72,16 @@ fn fine_lattices(scene: &Scene) -> Vec<Lattice> {
             *magnitude = magnitude.max(low[axis].abs()).max(high[axis].abs());
         }
     }
+    let mut tiles: BTreeMap<&str, [[f64; 3]; 2]> = BTreeMap::new();
+    for (&block, of_block) in &boxes {
+        let [low, high] = tiles.entry(group_of(block).0).or_insert(*of_block);
+        for axis in 0..3 {
+            low[axis] = low[axis].min(of_block[0][axis]);
+            high[axis] = high[axis].max(of_block[1][axis]);
+        }
+    }
+    tiles.remove("");
+    let is_several = tiles.len() > 1;
     let districts = groups.entry(("", None)).or_default();
     let mut of_district: BTreeMap<Option<u32>, [[f64; 3]; 2]> = BTreeMap::new();
     for member in members {
@@ -86,8 +97,11 @@ fn fine_lattices(scene: &Scene) -> Vec<Lattice> {
     of_nodes
         .iter()
         .map(|&block| {
-            let [extent, magnitude] = groups.get(&group_of(block)).copied().unwrap_or_default();
-            Lattice::for_extent(extent * (1.0 + 1e-6), magnitude)
+            let group = group_of(block);
+            let [extent, magnitude] = groups.get(&group).copied().unwrap_or_default();
+            let fine = Lattice::for_extent(extent * (1.0 + 1e-6), magnitude);
+            let of_tile = tiles.get(group.0).filter(|_| is_several);
+            of_tile.map_or(fine, |of_tile| fine.coarser(Lattice::for_tile(*of_tile)))
         })
         .collect()
 }

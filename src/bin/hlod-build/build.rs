@@ -346,6 +346,11 @@ impl Progress for Bar {
         });
     }
 
+    fn comparing(&self, input: &Path) {
+        let name = input.file_name().unwrap_or_default().to_string_lossy();
+        self.bar.set_message(format!("{name}: where it meets others"));
+    }
+
     fn found(&self, triangles: u64) {
         let total = self.found.fetch_add(triangles, Ordering::Relaxed) + triangles;
         self.bar.set_length(total);

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::builder::border::chain::CutPlane;
+use crate::builder::border::vertex::{Border, Path};
 use crate::builder::cut::split::Chunk;
 use crate::mesh::{PositionKey, key};
 
@@ -82,6 +83,49 @@ pub fn is_of_shared(plane: &CutPlane<f64>) -> bool {
     plane.coordinate.is_nan()
 }
 
+/// Gives a chunk that has no border yet its part of borders: the vertices that are in `planes`, of which it takes
+/// `most` at most, and those that are `kept` at every level.
+pub fn mark_border<'a>(
+    chunk: &mut Chunk<f64>,
+    planes: impl IntoIterator<Item = &'a Arc<CutPlane<f64>>>,
+    kept: &FxHashSet<PositionKey<f64>>,
+    most: usize,
+) {
+    let positions = &chunk.mesh.positions;
+    chunk.border = Border::interior(positions.len());
+    let at = |plane: &CutPlane<f64>| -> Vec<(usize, u8)> {
+        let level =
+            |(vertex, &position): (usize, &[f64; 3])| Some((vertex, plane.keep_level(position)?));
+        positions.iter().enumerate().filter_map(level).collect()
+    };
+    let mut path = Path::default();
+    let mut kept: Vec<usize> =
+        (0..positions.len()).filter(|&vertex| kept.contains(&key(positions[vertex]))).collect();
+    for plane in planes {
+        let vertices = at(plane);
+        if vertices.is_empty() {
+            continue;
+        }
+        if path.len() >= most {
+            kept.extend(vertices.iter().map(|&(vertex, _)| vertex));
+            continue;
+        }
+        for (vertex, level) in vertices {
+            chunk.border.planes[vertex] |= 1 << path.len();
+            chunk.border.keep[vertex] = level;
+        }
+        path = path.with(Arc::clone(plane));
+    }
+    if !kept.is_empty() {
+        for vertex in kept {
+            chunk.border.planes[vertex] |= 1 << path.len();
+            chunk.border.keep[vertex] = 0;
+        }
+        path = path.with(Arc::new(CutPlane::from_chains(0, f64::NAN, Vec::new())));
+    }
+    chunk.path = path;
+}
+
 /// Marks the shared vertices of a block, if it has any, as lying on a border that never thins, and
 /// whose edges cuts do not divide.
 pub fn keep_shared(chunk: &mut Chunk<f64>, shared: &FxHashSet<PositionKey<f64>>) {
@@ -105,7 +149,7 @@ pub fn keep_shared(chunk: &mut Chunk<f64>, shared: &FxHashSet<PositionKey<f64>>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::border::vertex::{Border, BorderVertexState};
+    use crate::builder::border::vertex::BorderVertexState;
     use crate::mesh::Mesh;
 
     #[test]

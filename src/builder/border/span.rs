@@ -52,6 +52,11 @@ impl BorderSpan {
         self.plane
     }
 
+    /// The chain's place in the plane, and those of the edges that it spans.
+    pub fn edges(&self) -> (usize, std::ops::Range<usize>) {
+        (self.chain as usize, self.ends[0] as usize..self.ends[1] as usize)
+    }
+
     /// The edge that stands for it.
     pub fn edge(&self, path: &Path) -> EdgeKey {
         let points = self.points(path);

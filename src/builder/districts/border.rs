@@ -15,11 +15,10 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::builder::border::chain::{BorderVertex, CutPlane, KeepRule};
 use crate::builder::border::rank::SurfaceQuadric;
-use crate::builder::border::shared::{Bounds, bounds_of, shared_positions};
-use crate::builder::border::vertex::{Border, Path};
+use crate::builder::border::shared::{Bounds, bounds_of, mark_border, shared_positions};
 use crate::builder::cut::split::Chunk;
 use crate::builder::districts::cuts::{Cuts, PlaneKey};
-use crate::mesh::{Mesh, PositionKey, key, wide};
+use crate::mesh::{DisjointSet, Mesh, PositionKey, key, wide};
 
 /// A district has at most so many planes around it; at what is beyond them nothing thins.
 const MOST_PLANES: usize = 60;
@@ -130,41 +129,7 @@ impl LevelBorder {
 
     /// Gives a district its part of the borders.
     pub fn mark(&self, chunk: &mut Chunk<f64>) {
-        let positions = &chunk.mesh.positions;
-        chunk.border = Border::interior(positions.len());
-        let at = |plane: &CutPlane<f64>| -> Vec<(usize, u8)> {
-            let level = |(vertex, &position): (usize, &[f64; 3])| {
-                Some((vertex, plane.keep_level(position)?))
-            };
-            positions.iter().enumerate().filter_map(level).collect()
-        };
-        let mut path = Path::default();
-        let mut kept: Vec<usize> = (0..positions.len())
-            .filter(|&vertex| self.kept.contains(&key(positions[vertex])))
-            .collect();
-        for plane in self.planes.values() {
-            let vertices = at(plane);
-            if vertices.is_empty() {
-                continue;
-            }
-            if path.len() >= MOST_PLANES {
-                kept.extend(vertices.iter().map(|&(vertex, _)| vertex));
-                continue;
-            }
-            for (vertex, level) in vertices {
-                chunk.border.planes[vertex] |= 1 << path.len();
-                chunk.border.keep[vertex] = level;
-            }
-            path = path.with(Arc::clone(plane));
-        }
-        if !kept.is_empty() {
-            for vertex in kept {
-                chunk.border.planes[vertex] |= 1 << path.len();
-                chunk.border.keep[vertex] = 0;
-            }
-            path = path.with(Arc::new(CutPlane::from_chains(0, f64::NAN, Vec::new())));
-        }
-        chunk.path = path;
+        mark_border(chunk, self.planes.values(), &self.kept, MOST_PLANES);
     }
 }
 
@@ -173,7 +138,7 @@ fn edge_key(ends: [[f64; 3]; 2]) -> EdgeKey {
     if a <= b { [a, b] } else { [b, a] }
 }
 
-/// The edges at which a surface ends, or its part beside the planes of cuts, in order of their ends. A lid
+/// The edges at which a surface ends, or its part without lids, in order of their ends. A lid
 /// closes what a cut opened: around it the border goes on, whether what is behind it is still there or
 /// not.
 fn open_edges(mesh: &Mesh<f64>, cuts: &Cuts) -> Vec<[[f64; 3]; 2]> {
@@ -182,15 +147,14 @@ fn open_edges(mesh: &Mesh<f64>, cuts: &Cuts) -> Vec<[[f64; 3]; 2]> {
         beside: u32,
         ends: [u32; 2],
     }
+    let is_lid = lids(mesh, cuts);
     let mut uses: FxHashMap<EdgeKey, Uses> = FxHashMap::default();
-    for &[a, b, c] in &mesh.triangles {
-        let corners = [a, b, c].map(|corner| mesh.positions[corner as usize]);
-        let is_beside = cuts.of(&corners).next().is_none();
-        for ends in [[a, b], [b, c], [c, a]] {
+    for (triangle, is_lid) in mesh.triangles.iter().zip(is_lid) {
+        for ends in edges(*triangle) {
             let positions = ends.map(|end| mesh.positions[end as usize]);
             let uses = uses.entry(edge_key(positions)).or_insert(Uses { all: 0, beside: 0, ends });
             uses.all += 1;
-            uses.beside += u32::from(is_beside);
+            uses.beside += u32::from(!is_lid);
         }
     }
     let is_open = |(_, uses): &(EdgeKey, Uses)| uses.all % 2 == 1 || uses.beside % 2 == 1;
@@ -198,6 +162,56 @@ fn open_edges(mesh: &Mesh<f64>, cuts: &Cuts) -> Vec<[[f64; 3]; 2]> {
         uses.into_iter().filter(is_open).map(|(edge, uses)| (edge, uses.ends)).collect();
     open.sort_unstable();
     open.into_iter().map(|(_, ends)| ends.map(|end| mesh.positions[end as usize])).collect()
+}
+
+fn edges([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
+}
+
+/// Of each triangle whether it is of a lid: of a patch in the plane of a cut that has the surface around it on
+/// one side of the plane. One that has it on both is where a surface passes through the plane.
+fn lids(mesh: &Mesh<f64>, cuts: &Cuts) -> Vec<bool> {
+    let plane_of = |triangle: &[u32; 3]| {
+        cuts.of(&triangle.map(|corner| mesh.positions[corner as usize])).next()
+    };
+    let planes: Vec<Option<PlaneKey>> = mesh.triangles.iter().map(plane_of).collect();
+    if planes.iter().all(Option::is_none) {
+        return vec![false; planes.len()];
+    }
+    let in_planes = || (0..).zip(&planes).filter(|(_, plane)| plane.is_some());
+    let edges_of = |triangle: u32| {
+        edges(mesh.triangles[triangle as usize])
+            .map(|ends| edge_key(ends.map(|end| mesh.positions[end as usize])))
+    };
+    let mut patches = DisjointSet::new(mesh.triangles.len());
+    let mut first_at: FxHashMap<EdgeKey, u32> = FxHashMap::default();
+    for (triangle, _) in in_planes() {
+        for edge in edges_of(triangle) {
+            let first = *first_at.entry(edge).or_insert(triangle);
+            if planes[first as usize] == planes[triangle as usize] {
+                patches.join(first, triangle);
+            }
+        }
+    }
+    // The sides of its plane on which there is surface around each patch.
+    let mut sides: FxHashMap<u32, [bool; 2]> = FxHashMap::default();
+    for (triangle, corners) in (0u32..).zip(&mesh.triangles) {
+        for edge in edges_of(triangle) {
+            let Some(&first) = first_at.get(&edge) else { continue };
+            let Some((axis, bits)) = planes[first as usize] else { continue };
+            if planes[triangle as usize] == planes[first as usize] {
+                continue;
+            }
+            let off = |corner: &u32| mesh.positions[*corner as usize][axis] - f64::from_bits(bits);
+            let farthest = corners.iter().map(off).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+            let is_above = farthest.is_some_and(|off| off > 0.0);
+            sides.entry(patches.root(first)).or_default()[usize::from(is_above)] = true;
+        }
+    }
+    let mut is_lid = |(triangle, plane): (u32, &Option<PlaneKey>)| {
+        plane.is_some() && sides.get(&patches.root(triangle)) != Some(&[true; 2])
+    };
+    (0..).zip(&planes).map(&mut is_lid).collect()
 }
 
 /// The surfaces around vertices, on all sides.

@@ -15,6 +15,7 @@ pub mod cuts;
 pub mod detail;
 pub mod grouping;
 pub mod members;
+pub mod near;
 pub mod widened;
 
 use std::collections::BTreeMap;
@@ -25,6 +26,7 @@ use self::border::LevelBorder;
 use self::detail::{FileDetail, Files};
 use self::grouping::{Item, groups};
 use self::members::Members;
+use self::near::join_near;
 use crate::Result;
 use crate::builder::block_setup::{BlockPlace, BlockSetup, Looks, Target};
 use crate::builder::blocks::gather::{gather, localise};
@@ -86,6 +88,8 @@ pub struct Above<'a> {
     pub up: UpAxis,
     /// The planes that divided the source into blocks.
     pub cuts: &'a [BlockCut],
+    /// Whether any of its inputs touch.
+    pub meet: bool,
 }
 
 /// Builds districts above trees, which may come in any order. Shared textures, which are written, are
@@ -95,7 +99,7 @@ pub fn build_districts(
     textures: &mut BTreeMap<String, SharedTexture>,
     above: &Above,
 ) -> Result<Districts> {
-    let &Above { options, out, stages, progress, earlier, up, cuts } = above;
+    let &Above { options, out, stages, progress, earlier, up, cuts, meet } = above;
     let mut districts = Districts::default();
     for _ in 0..MOST_LEVELS {
         if trees.len() <= MOST_ROOTS {
@@ -105,7 +109,7 @@ pub fn build_districts(
         let shared = SharedTextures::new();
         let target = Target { options, out, shared: &shared, stages, progress };
         let reused;
-        (trees, reused) = Level { up, cuts, target, earlier }.build(trees, &mut districts)?;
+        (trees, reused) = Level { up, cuts, meet, target, earlier }.build(trees, &mut districts)?;
         if let Some(earlier) = earlier {
             earlier.link_textures(reused.keys(), out)?;
         }
@@ -126,6 +130,7 @@ pub fn build_districts(
 struct Level<'a> {
     up: UpAxis,
     cuts: &'a [BlockCut],
+    meet: bool,
     target: Target<'a>,
     earlier: Option<&'a Earlier>,
 }
@@ -164,11 +169,16 @@ impl Level<'_> {
             group.into_iter().filter_map(|member| trees[member].take()).collect()
         };
         let taken: Vec<_> = found.into_iter().map(taken).collect();
-        let drafts = in_parallel(taken, |_, members| self.draft(members, lattice))?;
+        let cuts = self.cuts.iter().map(|cut| (cut.axis, lattice.round(cut.coordinate)));
+        let mut cuts: Vec<(usize, f64)> = cuts.collect();
+        let mut read = in_parallel(taken, |_, members| self.read(members, lattice))?;
+        if self.meet {
+            let mut members: Vec<&mut Members> = read.iter_mut().map(|(_, read)| read).collect();
+            cuts = self.target.stages.time(Stage::Gather, || join_near(&mut members, &cuts));
+        }
+        let drafts = in_parallel(read, |_, read| Ok(self.draft(read)))?;
         let rule = self.keep_rule(lattice);
         let meshes: Vec<_> = drafts.iter().map(|draft| &draft.chunk.mesh).collect();
-        let cuts = self.cuts.iter().map(|cut| (cut.axis, lattice.round(cut.coordinate)));
-        let cuts: Vec<(usize, f64)> = cuts.collect();
         let between = || LevelBorder::between(&meshes, &cuts, &rule);
         let borders = self.target.stages.time(Stage::Gather, between);
         let made = in_parallel(drafts, |_, draft| self.district(draft, &borders, lattice))?;
@@ -216,12 +226,22 @@ impl Level<'_> {
         }
     }
 
-    fn draft(&self, members: Vec<Tree<NodeRecord>>, lattice: Lattice) -> Result<Draft> {
-        let Target { options, out, stages, .. } = self.target;
+    fn read(
+        &self,
+        trees: Vec<Tree<NodeRecord>>,
+        lattice: Lattice,
+    ) -> Result<(Vec<Tree<NodeRecord>>, Members)> {
+        let Target { out, stages, .. } = self.target;
+        let records = trees.iter().map(|tree| &tree.record);
+        let members = stages.time(Stage::Gather, || members::read(out.path(), records, lattice))?;
+        Ok((trees, members))
+    }
+
+    fn draft(&self, (members, read): (Vec<Tree<NodeRecord>>, Members)) -> Draft {
+        let Target { options, stages, .. } = self.target;
         let hierarchy = &options.hierarchy;
         stages.time(Stage::Gather, || {
-            let records = members.iter().map(|tree| &tree.record);
-            let Members { mut model, skirts } = members::read(out.path(), records, lattice)?;
+            let Members { mut model, skirts } = read;
             merge_untextured(&mut model);
             // What thinned on both sides of a border of members, but not alike, had skirts.
             let looks = Looks::new(&model, hierarchy.seams);
@@ -230,7 +250,7 @@ impl Level<'_> {
             let chunk = gather(&model.materials, &model.parts, &between);
             // They are in the chunk now.
             model.parts.iter_mut().for_each(|part| part.positions = Vec::new());
-            Ok(Draft { members, model, looks, skirts, chunk })
+            Draft { members, model, looks, skirts, chunk }
         })
     }
 

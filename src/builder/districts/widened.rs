@@ -14,6 +14,9 @@ use crate::builder::border::vertex::Path;
 use crate::builder::districts::cuts::is_strip;
 use crate::mesh::wide;
 
+/// What a strip's corners may be off, as a share of its sides.
+const ROUNDING: f64 = 1e-3;
+
 /// The borders of a district whose polylines have what skirts of its members cover between two
 /// vertices, so that skirts over them cover that too.
 pub struct Widened {
@@ -33,7 +36,8 @@ impl Widened {
             let polygon =
                 |skirt: &Vec<DVec3>| Polygon::new(skirt, plane.axis, plane.coordinate.into());
             let polygons: Vec<Polygon> = skirts.iter().filter_map(polygon).collect();
-            let beside = beside_edges(&plane.chains, plane.axis, &polygons);
+            let is_own = own_edges(bit, &plane.chains, &spans);
+            let beside = beside_edges(&plane.chains, &is_own, plane.axis, &polygons);
             let chains = plane.chains.iter().zip(beside);
             let chains = chains.map(|(chain, beside)| {
                 let at = |at: &DVec2| raised(*at, plane.axis, plane.coordinate);
@@ -50,8 +54,24 @@ impl Widened {
     }
 }
 
+/// By chain and edge, whether the district has it: others are of its neighbours alone.
+fn own_edges(plane: u32, chains: &[Chain], spans: &[BorderSpan]) -> Vec<Vec<bool>> {
+    let mut is_own: Vec<Vec<bool>> =
+        chains.iter().map(|chain| vec![false; chain.positions.len()]).collect();
+    for span in spans.iter().filter(|span| span.plane() == plane) {
+        let (chain, edges) = span.edges();
+        is_own[chain][edges].fill(true);
+    }
+    is_own
+}
+
 /// By chain and edge, corners of what polygons cover beside it.
-fn beside_edges(chains: &[Chain], axis: usize, polygons: &[Polygon]) -> Vec<Vec<Vec<DVec2>>> {
+fn beside_edges(
+    chains: &[Chain],
+    is_own: &[Vec<bool>],
+    axis: usize,
+    polygons: &[Polygon],
+) -> Vec<Vec<Vec<DVec2>>> {
     let flat: Vec<Vec<DVec2>> = chains
         .iter()
         .map(|chain| chain.positions.iter().map(|&at| flattened(wide(at), axis)).collect())
@@ -60,13 +80,13 @@ fn beside_edges(chains: &[Chain], axis: usize, polygons: &[Polygon]) -> Vec<Vec<
         flat.iter().map(|chain| vec![Vec::new(); chain.len()]).collect();
     for polygon in polygons {
         let mut has_edge = false;
-        for (flat, beside) in flat.iter().zip(&mut beside) {
+        for ((flat, is_own), beside) in flat.iter().zip(is_own).zip(&mut beside) {
             let contains = |&edge: &usize| polygon.contains(0.5 * (flat[edge] + flat[edge + 1]));
             let mut first = 0;
             while first + 1 < flat.len() {
                 let count = (first..flat.len() - 1).take_while(contains).count();
                 if count > 0 {
-                    has_edge = true;
+                    has_edge |= is_own[first..first + count].contains(&true);
                     polygon
                         .share_out(&flat[first..=first + count], &mut beside[first..first + count]);
                 }
@@ -74,7 +94,7 @@ fn beside_edges(chains: &[Chain], axis: usize, polygons: &[Polygon]) -> Vec<Vec<
             }
         }
         // A strip may have another one between it and the edge.
-        if !has_edge && let Some((chain, edge)) = polygon.nearest_edge(&flat) {
+        if !has_edge && let Some((chain, edge)) = polygon.nearest_edge(&flat, is_own) {
             beside[chain][edge].extend(&polygon.corners);
         }
     }
@@ -168,20 +188,23 @@ impl Polygon {
         (area != 0.0).then_some(Self { corners, joint })
     }
 
+    /// Whether a point is in it, or beside one of its sides by no more than rounding leaves of being on it.
     fn contains(&self, point: DVec2) -> bool {
         (0..self.corners.len()).all(|at| {
             let (a, b) = (self.corners[at], self.corners[(at + 1) % self.corners.len()]);
-            (b - a).perp_dot(point - a) >= 0.0
+            let along = b - a;
+            along.perp_dot(point - a) >= -ROUNDING * along.length_squared()
         })
     }
 
-    /// The chain and edge that its middle is nearest to, no farther than it reaches itself.
-    fn nearest_edge(&self, chains: &[Vec<DVec2>]) -> Option<(usize, usize)> {
+    /// The chain and edge of the district that its middle is nearest to, no farther than it reaches itself.
+    fn nearest_edge(&self, chains: &[Vec<DVec2>], is_own: &[Vec<bool>]) -> Option<(usize, usize)> {
         let middle = self.corners.iter().sum::<DVec2>() / self.corners.len() as f64;
         let reach = self.corners.iter().map(|at| at.distance(middle)).fold(0.0, f64::max);
         let edges = chains.iter().enumerate().flat_map(|(chain, points)| {
             points.windows(2).enumerate().map(move |(edge, ends)| (chain, edge, ends))
         });
+        let edges = edges.filter(|&(chain, edge, _)| is_own[chain][edge]);
         let off = |ends: &[DVec2]| {
             let along = ends[1] - ends[0];
             let at = (middle - ends[0]).dot(along) / along.length_squared();
@@ -232,6 +255,23 @@ fn clip(corners: &[DVec2], along: DVec2, least: f64) -> Vec<DVec2> {
 mod tests {
     use super::*;
 
+    /// A strip is nearest to the edges of a neighbour that kept more, and is the district's all the same.
+    #[test]
+    fn strips_go_to_edges_of_the_district() {
+        let chain = |positions: &[[f32; 3]]| Chain {
+            positions: positions.to_vec(),
+            keep: vec![0; positions.len()],
+        };
+        let ends = [[0.0, 0.0, 0.0], [0.0, 10.0, 0.0]];
+        let chains = [chain(&[ends[0], [0.0, 5.0, 1.0], ends[1]]), chain(&ends)];
+        // Off its base by what joined vertices moved.
+        let strip = [(0.0, 0.1), (10.0, 0.1), (5.0, 1.0)].map(|(y, z)| DVec3::new(0.0, y, z));
+        let polygons = [Polygon::new(&strip, 0, 0.0).unwrap()];
+        let is_own = [vec![false; 3], vec![true; 2]];
+        let beside = beside_edges(&chains, &is_own, 0, &polygons);
+        assert!(!beside[1][0].is_empty());
+    }
+
     /// A strip whose end is beside the plane: what it goes on to is next to that end.
     #[test]
     fn ends_beside_the_plane_are_joined_with_what_was_next_to_them() {
@@ -247,7 +287,7 @@ mod tests {
         ];
         let polygons: Vec<Polygon> =
             [&closing[..], &strip].map(|skirt| Polygon::new(skirt, 0, 0.0).unwrap()).into();
-        let beside = beside_edges(&[chain], 0, &polygons);
+        let beside = beside_edges(&[chain], &[vec![true; 2]], 0, &polygons);
         assert_eq!(beside[0][0].last(), Some(&DVec2::new(7.0, 1.0)));
         assert!(strip.iter().all(|at| beside[0][0].contains(&flattened(*at, 0))));
     }

@@ -15,6 +15,6 @@ pub mod open_edges;
 mod strip;
 pub mod touching;
 
-pub use open_edges::OpenEdge;
+pub use open_edges::{OpenEdge, open_edges};
 pub use strip::Stitch;
 pub use touching::stitches;

@@ -8,7 +8,7 @@ use super::super::lines::statement_end;
 const SLACK_BYTES: usize = 1 << 12;
 
 /// Divides what a reader gives.
-pub(super) struct Chunks<R> {
+pub(in crate::import) struct Chunks<R> {
     reader: R,
     /// What was read and not handed out.
     text: Vec<u8>,
@@ -20,13 +20,13 @@ pub(super) struct Chunks<R> {
 
 impl<R: Read> Chunks<R> {
     /// Chunks of about so many bytes of `head` and what the reader has behind it.
-    pub(super) fn new(head: Vec<u8>, reader: R, bytes: usize) -> Self {
+    pub(in crate::import) fn new(head: Vec<u8>, reader: R, bytes: usize) -> Self {
         Self { reader, text: head, bytes: bytes.max(1), ended: false, failure: None }
     }
 
     /// The next chunk; `None` at the end. Where reading fails, what came before is handed out
     /// first.
-    pub(super) fn next(&mut self) -> io::Result<Option<Vec<u8>>> {
+    pub(in crate::import) fn next(&mut self) -> io::Result<Option<Vec<u8>>> {
         let mut wanted = self.bytes + SLACK_BYTES;
         loop {
             if let Some(end) = statement_end(&self.text, self.bytes - 1) {

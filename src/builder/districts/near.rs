@@ -1,0 +1,151 @@
+//! Vertices of several inputs that are nearly one ([`crate::builder::tiles::meeting`]), made one.
+//!
+//! Blocks keep such vertices where each input has them. A district is one surface, and it is off the source by more
+//! than what the vertices are apart, which is measured with the rest.
+
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+use super::members::Members;
+use crate::builder::stitch::open_edges;
+use crate::builder::tiles::meeting::WRITTEN;
+use crate::mesh::{NEAR, NearVertices, Part, PositionKey, all_differ, key};
+
+/// Joins what members of districts have where inputs meet: planes of `cuts` that are nearly one, and
+/// vertices at which members end, which go to others that may be the same, of each few to the first in order.
+/// Returns the planes that there are then.
+pub fn join_near(members: &mut [&mut Members], cuts: &[(usize, f64)]) -> Vec<(usize, f64)> {
+    let joined_cuts = JoinedCuts::new(cuts);
+    if joined_cuts.any() {
+        members.par_iter_mut().for_each(|members| {
+            let parts = members.model.parts.iter_mut().flat_map(|part| &mut part.positions);
+            parts.for_each(|position| joined_cuts.apply(position));
+            members.skirts.iter_mut().flatten().for_each(|corner| {
+                let mut at = corner.to_array();
+                joined_cuts.apply(&mut at);
+                *corner = at.into();
+            });
+        });
+    }
+    let open: Vec<_> = members.par_iter().map(|members| open_edges(&members.model.parts)).collect();
+    let edges = open.iter().flatten().map(|edge| edge.ends);
+    let moved = joined(&NearVertices::new(edges, NEAR));
+    let parts = members.par_iter_mut().flat_map(|members| &mut members.model.parts);
+    parts.for_each(|part| move_vertices(part, &moved));
+    joined_cuts.cuts
+}
+
+/// Cuts of which none is nearly another.
+struct JoinedCuts {
+    cuts: Vec<(usize, f64)>,
+    /// By axis, in order: what was near to which.
+    moves: [Vec<(f64, f64)>; 3],
+}
+
+impl JoinedCuts {
+    fn new(cuts: &[(usize, f64)]) -> Self {
+        let mut sorted = cuts.to_vec();
+        sorted.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut cuts: Vec<(usize, f64)> = Vec::new();
+        let mut moves: [Vec<(f64, f64)>; 3] = Default::default();
+        for (axis, coordinate) in sorted {
+            let last = cuts.last().filter(|last| last.0 == axis).map(|last| last.1);
+            match last.filter(|last| coordinate - last <= NEAR) {
+                Some(last) if last == coordinate => {}
+                Some(last) => moves[axis].push((coordinate, last)),
+                None => cuts.push((axis, coordinate)),
+            }
+        }
+        Self { cuts, moves }
+    }
+
+    fn any(&self) -> bool {
+        self.moves.iter().any(|moves| !moves.is_empty())
+    }
+
+    /// Brings what is in a plane that is gone to the one that stayed.
+    fn apply(&self, position: &mut [f64; 3]) {
+        for (coordinate, moves) in position.iter_mut().zip(&self.moves) {
+            let next = moves.partition_point(|&(from, _)| from < *coordinate - WRITTEN);
+            if let Some(&(_, to)) = moves.get(next).filter(|move_| move_.0 <= *coordinate + WRITTEN)
+            {
+                *coordinate = to;
+            }
+        }
+    }
+}
+
+/// Where vertices go that do not stay where they are.
+fn joined(vertices: &NearVertices) -> FxHashMap<PositionKey<f64>, [f64; 3]> {
+    let mut moved: FxHashMap<PositionKey<f64>, [f64; 3]> = FxHashMap::default();
+    for (number, &position) in (0u32..).zip(vertices.positions()) {
+        let stays = |other: u32| {
+            let at = vertices.positions()[other as usize];
+            other < number && !moved.contains_key(&key(at))
+        };
+        if let Some(other) = vertices.nearest_to(number, stays) {
+            moved.insert(key(position), vertices.positions()[other as usize]);
+        }
+    }
+    moved
+}
+
+fn move_vertices(part: &mut Part, moved: &FxHashMap<PositionKey<f64>, [f64; 3]>) {
+    let Part { positions, indices, .. } = part;
+    let mut any = false;
+    for position in positions.iter_mut() {
+        if let Some(to) = moved.get(&key(*position)) {
+            (*position, any) = (*to, true);
+        }
+    }
+    if any {
+        let apart =
+            |corners: &&[u32; 3]| all_differ(corners.map(|vertex| positions[vertex as usize]));
+        let kept: Vec<[u32; 3]> =
+            indices.as_chunks::<3>().0.iter().filter(apart).copied().collect();
+        *indices = kept.into_flattened();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    use crate::mesh::{Group, Model, Warnings};
+
+    fn square(from: [f64; 3]) -> Model {
+        let at = |x: f64, y: f64| [from[0] + x, from[1] + y, from[2]];
+        let part = Part {
+            positions: vec![at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)],
+            indices: vec![0, 1, 2, 0, 2, 3],
+            ..Part::default()
+        };
+        Model {
+            source: "square.obj".into(),
+            dependencies: Vec::new(),
+            groups: vec![Group { name: String::new() }],
+            parts: vec![part],
+            materials: Vec::new(),
+            textures: Vec::new(),
+            up: None,
+            warnings: Warnings::default(),
+        }
+    }
+
+    #[test]
+    fn what_is_millimetres_apart_is_joined_and_nothing_else_moves() {
+        let squares = [square([0.0; 3]), square([1.002, -0.001, 0.001]), square([-1.02, 0.0, 0.0])];
+        let skirts = vec![vec![DVec3::new(1.002, 0.5, 0.0), DVec3::new(1.002, 0.6, 0.5)]];
+        let mut members = squares.clone().map(|model| Members { model, skirts: skirts.clone() });
+        let cuts = [(0, 1.0), (1, 1.0), (0, 1.002), (0, 7.0)];
+        let joined = join_near(&mut members.iter_mut().collect::<Vec<_>>(), &cuts);
+        assert_eq!(joined, [(0, 1.0), (0, 7.0), (1, 1.0)]);
+        let at = |model: usize, vertex: usize| members[model].model.parts[0].positions[vertex];
+        assert_eq!([at(1, 0)[0], at(1, 3)[0]], [1.0; 2], "in the plane that stayed");
+        assert_eq!([at(1, 0), at(1, 3)], [at(0, 1), at(0, 2)]);
+        assert_eq!(at(1, 1), squares[1].parts[0].positions[1]);
+        assert_eq!(members[2].model.parts, squares[2].parts, "two centimetres are too far");
+        assert!(members[0].skirts[0].iter().all(|corner| corner.x == 1.0));
+    }
+}
