@@ -81,12 +81,14 @@ impl Ahead {
             if !frame.residents.contains(parent) {
                 continue;
             }
-            let there = expected.max(worth.away(frame, parent, options));
+            let mut there = None;
             for &child in frame.tree.children(parent) {
                 let asked = &mut self.asked[child as usize];
                 if std::mem::replace(asked, self.frame) != self.frame {
                     let worth = match frame.residents.contains(child) {
-                        true => there,
+                        true => *there.get_or_insert_with(|| {
+                            expected.max(worth.away(frame, parent, options))
+                        }),
                         false => expected / options.hysteresis,
                     };
                     out.ahead.push((child, worth));
@@ -183,7 +185,7 @@ mod tests {
         let input = FrameInput { predicted: &predicted, ..frame.input() };
         let (mut ahead, mut out) = (Ahead::default(), Selection::default());
         let mut kept = Worth::default();
-        kept.begin_frame(frame.tree.len(), 0.0);
+        kept.begin_frame(frame.tree.len(), 0.0, options);
         for _ in 0..2 * VIEWS {
             out.clear();
             out.requests.push((0, 1.0));
@@ -211,7 +213,7 @@ mod tests {
         let options = Options::default();
         let (mut ahead, mut out) = (Ahead::default(), Selection::default());
         let mut worth = Worth::default();
-        worth.begin_frame(frame.tree.len(), 0.0);
+        worth.begin_frame(frame.tree.len(), 0.0, &options);
         for _ in 0..2 * VIEWS {
             out.clear();
             ahead.request(&frame.input(), 0.0, &worth, &options, &mut out);

@@ -318,11 +318,11 @@ impl GainOverPrice {
     /// What is wanted in memory: the children of what is visited. What is there makes way only for what
     /// ranks so much higher, as in the image.
     fn request(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
-        self.worth.begin_frame(frame.tree.len(), frame.dt_s);
+        self.worth.begin_frame(frame.tree.len(), frame.dt_s, &self.options);
         out.requests.extend(frame.tree.roots().iter().map(|&root| (root, f64::MAX)));
         for &node in &self.visited {
             let rank = self.ranks[node as usize];
-            let worth = self.worth.in_view(node, rank, &self.options);
+            let worth = self.worth.in_view(node, rank);
             let is_hidden = frame.is_hidden(node);
             out.requests.extend(frame.tree.children(node).iter().filter_map(|&child| {
                 match frame.residents.contains(child) {
