@@ -18,7 +18,7 @@ use crate::builder::border::shared::{
 };
 use crate::builder::cut::split::Chunk;
 use crate::builder::emit::disk_sink::{NodeRecord, file_name};
-use crate::builder::hierarchy::{Forest, HierarchyOptions, LeftOut, Resolutions, Tree};
+use crate::builder::hierarchy::{BorderMode, Forest, HierarchyOptions, LeftOut, Resolutions, Tree};
 use crate::builder::options::BuildOptions;
 use crate::builder::simplify::aggregate::BodyRules;
 use crate::builder::stages::{Stage, Stages};
@@ -361,8 +361,12 @@ impl Drafting<'_> {
         // The blocks' own factors are not known yet; those of the largest serve all.
         let resolutions =
             Resolutions::new(most.min(chunk.mesh.triangles.len()), &options.hierarchy);
-        let shares: Vec<f64> =
-            resolutions.factors().iter().map(|factor| 1.0 / factor.sqrt()).collect();
+        let shares: Vec<f64> = match options.hierarchy.borders {
+            BorderMode::Locked => vec![1.0],
+            BorderMode::Shared | BorderMode::Skirts => {
+                resolutions.factors().iter().map(|factor| 1.0 / factor.sqrt()).collect()
+            }
+        };
         let constants = &options.hierarchy.constants;
         let chunks =
             divide(chunk, division, &shares, options.quantization(), constants, rules, stages);

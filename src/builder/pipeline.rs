@@ -138,8 +138,9 @@ fn run(
     let earlier = if options.force { None } else { open(&target).or_else(|| open(out)) };
     let preparing =
         Preparing { options, globe: globe.as_ref(), stages: &stages, inputs: all_inputs.len() };
-    let Plan { still_good, borders } =
-        Plan::new(&all_inputs, &inputs, earlier.as_ref(), &preparing, progress)?;
+    let beside = subset.map(|_| out.join(SUBSETS_DIR));
+    let Plan { still_good, borders, prepared } =
+        Plan::new(&all_inputs, &inputs, beside.as_deref(), earlier.as_ref(), &preparing, progress)?;
     if let Some(earlier) = &earlier
         && still_good.iter().all(Option::is_some)
         && earlier.report.inputs.len() == inputs.len()
@@ -158,7 +159,8 @@ fn run(
         stages: &stages,
         progress,
     };
-    let done = run.inputs(&inputs, &still_good, borders, earlier.as_ref(), &preparing)?;
+    let done =
+        run.inputs(&inputs, &still_good, (borders, prepared), earlier.as_ref(), &preparing)?;
     progress.finishing();
     let report = run.finish(done, earlier.as_ref(), parameters, part, begin)?;
     output.commit()?;
@@ -197,12 +199,13 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Builds inputs one after another, with these borders, or takes over what `still_good` says of them.
+    /// Builds inputs one after another, with these borders and of them what was read already, or takes over what
+    /// `still_good` says of them.
     fn inputs(
         &self,
         inputs: &[PathBuf],
         still_good: &[Option<InputReport>],
-        borders: Vec<InputBorder>,
+        (borders, mut prepared): (Vec<InputBorder>, BTreeMap<PathBuf, Prepared>),
         earlier: Option<&Earlier>,
         preparing: &Preparing,
     ) -> Result<Done> {
@@ -214,10 +217,13 @@ impl Run<'_> {
                 continue;
             }
             self.progress.reading(input, number + 1, inputs.len());
-            let model = ahead.take().unwrap_or_else(|| preparing.read(input))?;
+            let read = prepared.remove(input).map(Ok).or_else(|| ahead.take());
+            let model = read.unwrap_or_else(|| preparing.read(input))?;
             // Only the input that comes next in turn, and only where both fit in memory.
             let is_next = still_good.get(number + 1).is_some_and(Option::is_none);
-            let next = inputs.get(number + 1).filter(|next| is_next && fits_beside(input, next));
+            let next = inputs.get(number + 1).filter(|next| {
+                is_next && !prepared.contains_key(*next) && fits_beside(input, next)
+            });
             let (built, read_ahead) = rayon::join(
                 || self.input(input, model, border),
                 || next.map(|next| preparing.read(next)),

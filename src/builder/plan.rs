@@ -1,20 +1,23 @@
 //! Which inputs are built, with what borders, and which are taken over from an earlier result.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use rayon::prelude::*;
-
+use crate::Result;
 use crate::builder::inputs::{text_of, unchanged};
-use crate::builder::prepare::Preparing;
+use crate::builder::memory::total_bytes;
+use crate::builder::prepare::{Prepared, Preparing};
 use crate::builder::progress::Progress;
 use crate::builder::reuse::Earlier;
 use crate::builder::stages::Stage;
 use crate::builder::tiles::Tiles;
 use crate::builder::tiles::border::InputBorder;
+use crate::builder::tiles::boxes::boxes;
 use crate::builder::tiles::rim::BoundingBox;
 use crate::report::build_report::InputReport;
-use crate::{Result, import};
+
+/// Models of inputs that have a share of so much of the machine's memory, as files, are read once.
+const KEPT: u64 = 64;
 
 /// What is to be done about each input of a build, or of a share of it.
 pub struct Plan {
@@ -22,13 +25,16 @@ pub struct Plan {
     pub still_good: Vec<Option<InputReport>>,
     /// The borders of those that are built.
     pub borders: Vec<InputBorder>,
+    /// Those of them that were read already.
+    pub prepared: BTreeMap<PathBuf, Prepared>,
 }
 
 impl Plan {
-    /// For `inputs` of all.
+    /// For `inputs` of all. `subsets` is the folder of all shares, where these are one.
     pub fn new(
         all: &[PathBuf],
         inputs: &[PathBuf],
+        subsets: Option<&Path>,
         earlier: Option<&Earlier>,
         preparing: &Preparing,
         progress: &dyn Progress,
@@ -40,8 +46,12 @@ impl Plan {
         let compare = || inputs.iter().map(same).collect::<Vec<Option<InputReport>>>();
         let mut still_good = preparing.stages.time(Stage::Compare, compare);
         if all.len() == 1 {
+            // One among several was on a lattice that it need not be on alone.
+            still_good.iter_mut().for_each(|report| {
+                report.take_if(|known| known.bounds.is_some());
+            });
             let borders = vec![InputBorder::default(); inputs.len()];
-            return Ok(Self { still_good, borders });
+            return Ok(Self { still_good, borders, prepared: BTreeMap::new() });
         }
         let place_of: BTreeMap<&PathBuf, usize> = all.iter().zip(0..).collect();
         let places: Vec<usize> = inputs.iter().map(|input| place_of[input]).collect();
@@ -50,11 +60,8 @@ impl Plan {
         for (&place, report) in places.iter().zip(&still_good) {
             known[place] = report.as_ref().and_then(|report| report.bounds);
         }
-        let box_of = |(input, known): (&PathBuf, &Option<BoundingBox>)| {
-            known.map_or_else(|| import::bounds(input), Ok)
-        };
-        let boxes: Vec<BoundingBox> =
-            all.par_iter().zip(&known).map(box_of).collect::<Result<_>>()?;
+        let first = places.first().copied().unwrap_or(0);
+        let boxes = boxes(all, &known, subsets, first)?;
         let mut tiles = Tiles::new(all, boxes, preparing.options);
         let is_changed = |place: usize| known[place].is_none();
         // One that met an input that is gone, too.
@@ -72,9 +79,18 @@ impl Plan {
         };
         let in_question: BTreeSet<usize> =
             places.iter().zip(&still_good).filter_map(in_question).collect();
-        tiles.read_rims(in_question.iter().copied(), |place| {
+        // What is read for its border is kept to be built, where all of it is small.
+        let bytes = |input: &PathBuf| std::fs::metadata(input).map_or(0, |facts| facts.len());
+        let keep = all.iter().map(bytes).sum::<u64>() <= total_bytes() / KEPT;
+        let mut prepared: BTreeMap<PathBuf, Prepared> = BTreeMap::new();
+        tiles.read_rims(in_question.iter().copied(), |place, rim| {
             progress.comparing(&all[place]);
-            Ok(preparing.read(&all[place])?.model)
+            let read = preparing.read(&all[place])?;
+            let rim = rim(&read.model);
+            if keep && is_changed(place) {
+                prepared.insert(all[place].clone(), read);
+            }
+            Ok(rim)
         })?;
         let mut borders = Vec::with_capacity(inputs.len());
         for (place, report) in places.iter().zip(&mut still_good) {
@@ -86,6 +102,6 @@ impl Plan {
                 .take_if(|known| in_question.contains(place) && known.meetings != border.meetings);
             borders.push(border);
         }
-        Ok(Self { still_good, borders })
+        Ok(Self { still_good, borders, prepared })
     }
 }

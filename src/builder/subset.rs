@@ -1,6 +1,6 @@
 //! A share of a build's inputs, so that several machines build one result.
 
-use std::cmp::Reverse;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::format::SUBSETS_DIR;
@@ -54,7 +54,8 @@ impl Subset {
     }
 
     /// Those of all inputs that are of this share: the same on every machine that sees the same files.
-    /// The largest are given out first, each to the share that has the fewest bytes.
+    /// They follow one another, since names of tiles that do so are mostly those of neighbours, whose common
+    /// borders then are of one share; of bytes all have about the same.
     pub fn pick(self, inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
         if inputs.len() < self.of as usize {
             return Err(Error::Usage(format!(
@@ -64,27 +65,31 @@ impl Subset {
         }
         let bytes = |input: &PathBuf| std::fs::metadata(input).map_or(0, |facts| facts.len());
         let sizes: Vec<u64> = inputs.iter().map(bytes).collect();
-        Ok(self.picked(&sizes).into_iter().map(|at| inputs[at].clone()).collect())
+        Ok(inputs[self.picked(&sizes)].to_vec())
     }
 
-    /// The places of those of this share among inputs of so many bytes, in order.
-    fn picked(self, sizes: &[u64]) -> Vec<usize> {
-        let mut largest_first: Vec<usize> = (0..sizes.len()).collect();
-        largest_first.sort_by_key(|&at| (Reverse(sizes[at]), at));
-        // Bytes and inputs of each share: empty files are given out evenly too.
-        let mut shares = vec![(0u64, 0usize); self.of as usize];
-        let mut picked = Vec::new();
-        for at in largest_first {
-            let least = (0..shares.len()).min_by_key(|&share| shares[share]).unwrap_or(0);
-            let (bytes, inputs) = &mut shares[least];
-            *bytes += sizes[at];
-            *inputs += 1;
-            if least + 1 == self.number as usize {
-                picked.push(at);
+    /// The places of those of this share among inputs of so many bytes. Each share has one at least.
+    fn picked(self, sizes: &[u64]) -> Range<usize> {
+        // Empty files are shared out evenly too.
+        let sizes: Vec<u64> = sizes.iter().map(|size| size + 1).collect();
+        let (mut first, mut rest) = (0, sizes.iter().sum::<u64>());
+        for number in 1..=self.of {
+            let after = (self.of - number) as usize;
+            // What is left is shared out evenly among this and those after it.
+            let share = rest / (after as u64 + 1);
+            let mut end = first + 1;
+            let mut bytes = sizes[first];
+            // An input goes to the share that has the larger part of it.
+            while end < sizes.len() - after && (after == 0 || bytes + sizes[end] / 2 < share) {
+                bytes += sizes[end];
+                end += 1;
             }
+            if number == self.number {
+                return first..end;
+            }
+            (first, rest) = (end, rest - bytes);
         }
-        picked.sort_unstable();
-        picked
+        first..sizes.len()
     }
 }
 
@@ -115,17 +120,23 @@ mod tests {
         let mut random = Random::new(5, 0);
         for of in [1, 2, 3, 7] {
             let sizes: Vec<u64> = (0..40).map(|_| (random.unit() * 1e6) as u64).collect();
-            let shares: Vec<Vec<usize>> =
+            let shares: Vec<Range<usize>> =
                 Subset::all(of).map(|subset| subset.picked(&sizes)).collect();
-            let mut all = shares.concat();
-            all.sort_unstable();
-            assert_eq!(all, (0..40).collect::<Vec<_>>());
-            let bytes = |share: &Vec<usize>| share.iter().map(|&at| sizes[at]).sum::<u64>();
+            assert_eq!(
+                shares.iter().cloned().flatten().collect::<Vec<_>>(),
+                (0..40).collect::<Vec<_>>()
+            );
+            let bytes = |share: &Range<usize>| sizes[share.clone()].iter().sum::<u64>();
             let least = shares.iter().map(bytes).min().unwrap();
             let most = shares.iter().map(bytes).max().unwrap();
-            assert!(most - least <= *sizes.iter().max().unwrap(), "{least} {most}");
+            assert!(most - least <= 2 * *sizes.iter().max().unwrap(), "{least} {most}");
         }
-        let empty: Vec<usize> = Subset::all(3).map(|subset| subset.picked(&[0; 6]).len()).collect();
-        assert_eq!(empty, [2, 2, 2]);
+        let lengths = |sizes: &[u64]| -> Vec<usize> {
+            Subset::all(3).map(|subset| subset.picked(sizes).len()).collect()
+        };
+        assert_eq!(lengths(&[0; 6]), [2; 3]);
+        assert_eq!(lengths(&[1, 1, 900]), [1; 3]);
+        assert_eq!(lengths(&[900, 1, 1]), [1; 3]);
+        assert_eq!(lengths(&[5; 6]), [2; 3]);
     }
 }

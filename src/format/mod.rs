@@ -58,6 +58,8 @@ pub const TILESET_FILE: &str = "tileset.json";
 pub const TILESETS_DIR: &str = "tilesets";
 /// The folder of results of subsets inside an output folder, until they are merged.
 pub const SUBSETS_DIR: &str = "subsets";
+/// Of [`SUBSETS_DIR`], the folder of where inputs are, as those who build shares of them have found.
+pub const BOXES_DIR: &str = "boxes";
 /// The scene description inside an output folder.
 pub const SCENE_FILE: &str = "scene.hlod";
 /// The folder of node files inside an output folder.

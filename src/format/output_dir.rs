@@ -11,8 +11,8 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
 use super::{
-    NODES_DIR, REPORT_FILE, SCENE_FILE, SCENE_MAGIC, SUBSETS_DIR, TEXTURES_DIR, TILESET_FILE,
-    TILESETS_DIR,
+    BOXES_DIR, NODES_DIR, REPORT_FILE, SCENE_FILE, SCENE_MAGIC, SUBSETS_DIR, TEXTURES_DIR,
+    TILESET_FILE, TILESETS_DIR,
     cells::{CELLS_DIR, CELLS_FILE},
 };
 use crate::builder::Subset;
@@ -282,6 +282,10 @@ fn is_of_subsets(folder: &Path) -> bool {
                 Subset::of_dir(subset).is_some()
                     && (rest.starts_with(PARTIAL) || rest.starts_with(ASIDE))
             }
+            None if name == BOXES_DIR => {
+                let boxes = fs::read_dir(folder.join(&*name)).and_then(sorted_names);
+                boxes.is_ok_and(|boxes| boxes.iter().all(|name| is_box(&name.to_string_lossy())))
+            }
             None => {
                 Subset::of_dir(&name).is_some()
                     && begins_with_magic(&folder.join(&*name).join(SCENE_FILE))
@@ -289,6 +293,11 @@ fn is_of_subsets(folder: &Path) -> bool {
         }
     };
     names.iter().all(is_ours)
+}
+
+/// Whether a file is a box, or what is left of one that was being written.
+fn is_box(name: &str) -> bool {
+    name.ends_with(".json") || name.starts_with(".tmp")
 }
 
 fn begins_with_magic(path: &Path) -> bool {

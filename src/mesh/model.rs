@@ -121,6 +121,23 @@ pub struct Model {
     pub warnings: Warnings,
 }
 
+#[cfg(test)]
+impl Model {
+    /// Of one group and no materials.
+    pub(crate) fn of_parts(parts: Vec<Part>) -> Self {
+        Self {
+            source: "parts.obj".into(),
+            dependencies: Vec::new(),
+            groups: vec![Group { name: String::new() }],
+            parts,
+            materials: Vec::new(),
+            textures: Vec::new(),
+            up: None,
+            warnings: Warnings::default(),
+        }
+    }
+}
+
 impl Model {
     /// Least and greatest coordinates of all vertices.
     pub fn bounds(&self) -> [[f64; 3]; 2] {

@@ -151,6 +151,8 @@ fn join_inputs<'a>(
 pub(super) struct Rims {
     /// Vertices of several inputs that are not at one place.
     apart: FxHashSet<PositionKey<f64>>,
+    /// A number for the input of each node.
+    inputs: Vec<u32>,
     edges: Vec<(RimEdge, u32)>,
 }
 
@@ -161,19 +163,35 @@ impl Rims {
         let mut edges: Vec<(RimEdge, u32)> = leaves.par_iter().flat_map_iter(rim).collect();
         let apart = join_inputs(&mut edges, |leaf| input_of(scene, leaf));
         edges.par_sort_unstable_by_key(|&(edge, leaf)| (edge.keys, leaf));
-        Self { apart, edges }
+        let mut numbers: BTreeMap<Option<&str>, u32> = BTreeMap::new();
+        let mut number = |node: u32| {
+            let next = numbers.len() as u32;
+            *numbers.entry(input_of(scene, node)).or_insert(next)
+        };
+        let inputs = (0..scene.nodes.len() as u32).map(&mut number).collect();
+        Self { apart, inputs, edges }
     }
 
     fn equal(&self) -> impl Iterator<Item = &[(RimEdge, u32)]> {
         self.edges.chunk_by(|a, b| a.0.keys == b.0.keys)
     }
 
-    /// All edges that several leaves share, once for each pair of leaves.
+    /// All edges that several leaves share, once for each pair of leaves; of different inputs those at which
+    /// both end.
     pub fn seams(&self) -> Vec<Seam> {
         let mut seams = Vec::new();
         for same in self.equal() {
+            let input = |leaf: u32| self.inputs[leaf as usize];
+            let ends = |of: u32| {
+                let of_input = same.iter().filter(|&&(_, leaf)| input(leaf) == of);
+                of_input.map(|(edge, _)| edge.uses).sum::<u32>() == 1
+            };
+            let meet = |a: u32, b: u32| {
+                let [a, b] = [a, b].map(input);
+                a == b || (ends(a) && ends(b))
+            };
             for (index, &(edge, a)) in same.iter().enumerate() {
-                let others = same[index + 1..].iter().filter(|&&(_, b)| a != b);
+                let others = same[index + 1..].iter().filter(|&&(_, b)| a != b && meet(a, b));
                 seams.extend(others.map(|&(other, b)| Seam {
                     ends: edge.ends,
                     leaves: [a, b],
@@ -186,26 +204,34 @@ impl Rims {
 
     /// Edges of one leaf alone that lie between two vertices of another's rim, once for each such
     /// other: where a cutting plane passes through borders of the source that have vertices within
-    /// each other's edges, no edge is shared.
+    /// each other's edges, no edge is shared. Of different inputs those at which both end.
     pub fn between_vertices(&self) -> Vec<Seam> {
         let alone = || self.equal().filter(|same| same.len() == 1).map(|same| same[0]);
-        let mut leaves_at: FxHashMap<PositionKey<f64>, Vec<u32>> = FxHashMap::default();
+        let is_end = |edge: &RimEdge| edge.uses == 1;
+        // Leaves, and whether they end there.
+        let mut leaves_at: FxHashMap<PositionKey<f64>, Vec<(u32, bool)>> = FxHashMap::default();
         for (edge, leaf) in alone() {
             for end in edge.keys {
                 let leaves = leaves_at.entry(end).or_default();
-                if !leaves.contains(&leaf) {
-                    leaves.push(leaf);
+                match leaves.iter_mut().find(|(known, _)| *known == leaf) {
+                    Some((_, ends)) => *ends |= is_end(&edge),
+                    None => leaves.push((leaf, is_end(&edge))),
                 }
             }
         }
         let mut seams = Vec::new();
         for (edge, leaf) in alone() {
+            let input = |leaf: u32| self.inputs[leaf as usize];
+            let meets = |&&(other, ends): &&(u32, bool)| {
+                other != leaf && (input(other) == input(leaf) || (ends && is_end(&edge)))
+            };
             let [from, to] = edge.keys.map(|end| &leaves_at[&end]);
-            let others = from.iter().filter(|&&other| other != leaf && to.contains(&other));
+            let others = from.iter().filter(meets).map(|(other, _)| *other);
+            let others = others.filter(|&other| to.iter().any(|(leaf, _)| *leaf == other));
             // As far as they may be, where they are not at one place.
             let is_apart = edge.keys.iter().any(|end| self.apart.contains(end));
             let off = if is_apart { DVec3::X * NEAR } else { DVec3::ZERO };
-            let seam = |&other: &u32| Seam {
+            let seam = |other: u32| Seam {
                 ends: edge.ends,
                 leaves: [leaf.min(other), leaf.max(other)],
                 other_ends: edge.ends.map(|end| end + off),

@@ -195,16 +195,31 @@ fn only_a_changed_input_is_built_again() {
     }
 }
 
+/// What comes and goes elsewhere changes nothing; with a neighbour its border goes too.
 #[test]
 fn inputs_come_and_go() {
     let folder = three_parts();
     let out = folder.path().join("out");
+    let elsewhere =
+        CityOptions { blocks: 4, triangles: 10_000, split: true, offset: [5e3; 3], ..small_city() };
+    city::write(&elsewhere, &folder.path().join("far")).unwrap();
     let (a, b, c) = ("parts/block_0000.obj", "parts/block_0001.obj", "parts/block_0002.obj");
-    build(folder.path(), &[a, b, "out"]);
+    let (far, farther) = ("far/block_0002.obj", "far/block_0003.obj");
+    build(folder.path(), &[a, b, far, "out"]);
     let kept = nodes_of(&out, "block_0001");
-    for arguments in [&[b, c, "out"][..], &[a, b, c, "out"], &[b, "out"], &["parts", "out"]] {
+    for (arguments, stays) in [
+        (&[a, b, farther, "out"][..], true),
+        (&[a, b, far, farther, "out"], true),
+        (&[a, b, "out"], true),
+        (&[b, far, "out"], false),
+        (&[b, "out"], false),
+        (&[a, b, c, "out"], false),
+        (&["parts", "far", "out"], false),
+    ] {
         assert!(!is_up_to_date(&build(folder.path(), arguments)), "{arguments:?}");
-        assert_eq!(nodes_of(&out, "block_0001"), kept, "{arguments:?}: the same files");
+        if stays {
+            assert_eq!(nodes_of(&out, "block_0001"), kept, "{arguments:?}: the same files");
+        }
         let clean = clean_build(folder.path(), arguments);
         assert_eq!(difference(&clean, &without_report(&out)), None, "{arguments:?}");
     }

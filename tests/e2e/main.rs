@@ -2,6 +2,8 @@
 //!
 //! One test program with a module for each promise, so that the library is linked once.
 
+#[path = "../common/tiles.rs"]
+mod cut_into_tiles;
 mod support;
 
 mod cli;
@@ -21,6 +23,7 @@ mod real_data;
 mod seams;
 mod soups;
 mod subsets;
+mod tiles;
 mod tileset;
 mod touching;
 mod verify;

@@ -112,7 +112,7 @@ mod tests {
     use super::*;
     use glam::DVec3;
 
-    use crate::mesh::{Group, Model, Warnings};
+    use crate::mesh::Model;
 
     fn square(from: [f64; 3]) -> Model {
         let at = |x: f64, y: f64| [from[0] + x, from[1] + y, from[2]];
@@ -121,16 +121,7 @@ mod tests {
             indices: vec![0, 1, 2, 0, 2, 3],
             ..Part::default()
         };
-        Model {
-            source: "square.obj".into(),
-            dependencies: Vec::new(),
-            groups: vec![Group { name: String::new() }],
-            parts: vec![part],
-            materials: Vec::new(),
-            textures: Vec::new(),
-            up: None,
-            warnings: Warnings::default(),
-        }
+        Model::of_parts(vec![part])
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //! everything but the leaves, which stay the source: cutting planes divide the strips too, and
 //! simplification finds vertices inside of a surface where there were two borders.
 //!
-//! - [`open_edges`]: the borders
+//! - [`mod@open_edges`]: the borders
 //! - [`touching`]: what touches
 //! - `strip`: the triangles from one border to the other
 

@@ -338,3 +338,121 @@ impl<'a> Common<'a> {
         ranked.chains.iter().map(chain).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::options::BuildOptions;
+    use crate::mesh::{Model, Part};
+
+    /// A hilly square of `n` by `n` cells of a metre with its corner at `x`, `y`, moved by `off`.
+    fn ground(n: u32, [x, y]: [f64; 2], off: f64) -> Model {
+        let mut part = Part::default();
+        for i in 0..=n {
+            for j in 0..=n {
+                let (x, y) = (x + f64::from(i), y + f64::from(j));
+                let z = (x * 1.7).sin() + (y * 2.3).cos() + (x * y * 0.1).sin();
+                part.positions.push([x + off, y - off, z + off]);
+            }
+        }
+        for i in 0..n {
+            for j in 0..n {
+                let [a, b, c, d] =
+                    [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[di, dj]| (i + di) * (n + 1) + j + dj);
+                part.indices.extend([a, b, c, a, c, d]);
+            }
+        }
+        Model::of_parts(vec![part])
+    }
+
+    fn rim(model: &Model) -> Rim {
+        let everywhere = [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]];
+        let mut options = BuildOptions::default();
+        options.hierarchy.desired_tris = 100;
+        Rim::new(model, &[everywhere], NEAR, &options)
+    }
+
+    fn between(models: [&Model; 2], thirds: &[&Model]) -> [Share; 2] {
+        let rims = models.map(rim);
+        let thirds: Vec<Rim> = thirds.iter().map(|model| rim(model)).collect();
+        let thirds: Vec<&Rim> = thirds.iter().collect();
+        shares([&rims[0], &rims[1]], &thirds, BorderConstants::default())
+    }
+
+    /// The levels from which vertices along a border are kept, as a side has it.
+    fn keeps(share: &Share, at: impl Fn(f64) -> [f64; 3]) -> Vec<u8> {
+        let [plane] = &share.planes[..] else { panic!("{} planes", share.planes.len()) };
+        (0..=20).map(|y| plane.keep_level(at(f64::from(y))).unwrap()).collect()
+    }
+
+    #[test]
+    fn both_sides_of_a_plane_keep_the_same() {
+        let (one, other) = (ground(20, [0.0; 2], 0.0), ground(20, [20.0, 0.0], 0.0));
+        let [left, right] = between([&one, &other], &[]);
+        let z = |y: f64| (20.0 * 1.7f64).sin() + (y * 2.3).cos() + (20.0 * y * 0.1).sin();
+        let kept = keeps(&left, |y| [20.0, y, z(y)]);
+        assert_eq!(kept, keeps(&right, |y| [20.0, y, z(y)]));
+        assert_eq!((left.planes[0].axis, left.planes[0].coordinate), (0, 20.0));
+        assert!(left.kept.is_empty() && right.kept.is_empty());
+        let coarse = kept.iter().filter(|&&level| level == 0).count();
+        assert!((2..15).contains(&coarse), "{kept:?}");
+        assert_eq!(left.hash(), right.hash());
+        let [left_again, _] = between([&one, &ground(20, [20.0, 0.0], 0.0)], &[]);
+        assert_eq!(left_again.hash(), left.hash());
+    }
+
+    #[test]
+    fn each_side_keeps_its_own_positions_where_they_nearly_agree() {
+        let (one, other) = (ground(20, [0.0; 2], 0.0), ground(20, [20.0, 0.0], 0.002));
+        let [left, right] = between([&one, &other], &[]);
+        let z = |y: f64| (20.0 * 1.7f64).sin() + (y * 2.3).cos() + (20.0 * y * 0.1).sin();
+        let kept = keeps(&left, |y| [20.0, y, z(y)]);
+        assert_eq!(kept, keeps(&right, |y| [20.0 + 0.002, y - 0.002, z(y) + 0.002]));
+        assert!(kept.iter().any(|&level| level > 0));
+        assert_eq!(right.planes[0].coordinate, 20.0 + 0.002);
+        // Two centimetres are too far.
+        let apart = between([&one, &ground(20, [20.0, 0.0], 0.02)], &[]);
+        assert!(apart.iter().all(Share::is_empty));
+    }
+
+    #[test]
+    fn a_vertex_of_three_inputs_stays() {
+        let models = [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0]].map(|at| ground(20, at, 0.0));
+        let corner = [20.0, 20.0];
+        let [left, _] = between([&models[0], &models[1]], &[&models[2]]);
+        let at_corner = models[0].parts[0].positions.iter();
+        let at_corner = at_corner.copied().find(|at| at[..2] == corner).unwrap();
+        assert_eq!(left.planes[0].keep_level(at_corner), Some(0));
+        let [left, _] = between([&models[0], &models[1]], &[]);
+        assert_eq!(left.planes[0].keep_level(at_corner), Some(0), "an end stays anyhow");
+        // The two that have no more than a point in common have no border.
+        let corners = between([&models[0], &models[2]], &[&models[1]]);
+        assert!(corners.iter().all(Share::is_empty));
+        // Within the border of two, a vertex of a third one.
+        let third = ground(10, [20.0, 20.0], 0.0);
+        let tall = [[0.0, 10.0], [20.0, 10.0]].map(|at| ground(20, at, 0.0));
+        let at = |share: &Share| share.planes[0].keep_level(at_corner).unwrap();
+        let [alone, _] = between([&tall[0], &tall[1]], &[]);
+        let [beside, _] = between([&tall[0], &tall[1]], &[&third]);
+        assert!(at(&alone) > 0 && at(&beside) == 0, "{} {}", at(&alone), at(&beside));
+    }
+
+    /// A plane that both surfaces lie in does not divide them.
+    #[test]
+    fn what_is_common_along_a_ragged_line_stays() {
+        let flat = |mut model: Model, ragged: bool| {
+            for position in &mut model.parts[0].positions {
+                let [x, y, _] = *position;
+                let beside = if ragged && x == 20.0 { 0.3 * (y * 1.3).sin() } else { 0.0 };
+                *position = [x + beside, y, 0.0];
+            }
+            model
+        };
+        let [left, right] = between(
+            [&flat(ground(20, [0.0; 2], 0.0), true), &flat(ground(20, [20.0, 0.0], 0.0), true)],
+            &[],
+        );
+        assert!(left.planes.is_empty() && right.planes.is_empty());
+        assert_eq!([left.kept.len(), right.kept.len()], [21; 2]);
+    }
+}

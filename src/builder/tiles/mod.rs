@@ -3,9 +3,10 @@
 //! Each input is built on its own, so that one is in memory at a time, and one that changes is built again
 //! alone. What it must know of others is where they meet: [`rim`] says where an input ends, [`meeting`]
 //! what two of them have in common there and how it thins, alike on both sides. [`border`] is what an
-//! input's blocks are given.
+//! input's blocks are given. Which may meet their boxes say ([`mod@boxes`]).
 
 pub mod border;
+pub mod boxes;
 pub mod meeting;
 pub mod rim;
 
@@ -50,11 +51,12 @@ impl<'a> Tiles<'a> {
         &self.neighbours[input]
     }
 
-    /// Makes sure that the borders of some inputs can be told. `read` gives an input's model as it is built.
+    /// Makes sure that the borders of some inputs can be told. `read` reads an input, and gives what it is told of
+    /// its model as it is built.
     pub fn read_rims(
         &mut self,
         of: impl Iterator<Item = usize>,
-        read: impl Fn(usize) -> Result<Model>,
+        mut read: impl FnMut(usize, &dyn Fn(&Model) -> Rim) -> Result<Rim>,
     ) -> Result<()> {
         let with_neighbours = of.filter(|&input| !self.neighbours[input].is_empty());
         let wanted: BTreeSet<usize> = with_neighbours
@@ -69,8 +71,9 @@ impl<'a> Tiles<'a> {
                 true => vec![everywhere],
                 false => self.neighbours[input].iter().map(|&other| self.boxes[other]).collect(),
             };
-            self.rims
-                .insert(input, Rim::new(&read(input)?, &others, reach(self.options), self.options));
+            let rim = |model: &Model| Rim::new(model, &others, reach(self.options), self.options);
+            let rim = read(input, &rim)?;
+            self.rims.insert(input, rim);
         }
         Ok(())
     }
