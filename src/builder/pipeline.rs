@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use rayon::prelude::*;
+
 use crate::builder::block::{BuiltBlock, build_input};
 use crate::builder::block_setup::Target;
 use crate::builder::districts::{Above, Districts, build_districts};
@@ -210,26 +212,42 @@ impl Run<'_> {
         preparing: &Preparing,
     ) -> Result<Done> {
         let mut done = Done::default();
+        // What was read already is small, and several are built at a time: one alone may be a block or two.
+        let mut together = Vec::new();
+        for ((input, border), report) in inputs.iter().zip(&borders).zip(still_good) {
+            if let (None, Some(prepared)) = (report, prepared.remove(input)) {
+                together.push((input, prepared, border));
+            }
+        }
+        let build = |(input, prepared, border): (&PathBuf, Prepared, &InputBorder)| {
+            (input.clone(), self.input(input, prepared, border.clone()))
+        };
+        let mut together: BTreeMap<PathBuf, Result<_>> =
+            together.into_par_iter().with_max_len(1).map(build).collect();
         let mut ahead: Option<Result<Prepared>> = None;
-        for (number, (input, border)) in inputs.iter().zip(borders).enumerate() {
+        for (number, (input, border)) in inputs.iter().zip(&borders).enumerate() {
             if let (Some(report), Some(earlier)) = (&still_good[number], earlier) {
                 self.take_over(report, earlier, &mut done)?;
                 continue;
             }
-            self.progress.reading(input, number + 1, inputs.len());
-            let read = prepared.remove(input).map(Ok).or_else(|| ahead.take());
-            let model = read.unwrap_or_else(|| preparing.read(input))?;
-            // Only the input that comes next in turn, and only where both fit in memory.
-            let is_next = still_good.get(number + 1).is_some_and(Option::is_none);
-            let next = inputs.get(number + 1).filter(|next| {
-                is_next && !prepared.contains_key(*next) && fits_beside(input, next)
-            });
-            let (built, read_ahead) = rayon::join(
-                || self.input(input, model, border),
-                || next.map(|next| preparing.read(next)),
-            );
-            ahead = read_ahead;
-            let (blocks, report) = built?;
+            let (blocks, report) = match together.remove(input) {
+                Some(built) => built?,
+                None => {
+                    self.progress.reading(input, number + 1, inputs.len());
+                    let model = ahead.take().unwrap_or_else(|| preparing.read(input))?;
+                    // Only the input that comes next in turn, and only where both fit in memory.
+                    let is_next = still_good.get(number + 1).is_some_and(Option::is_none);
+                    let next = inputs.get(number + 1).filter(|next| {
+                        is_next && !together.contains_key(*next) && fits_beside(input, next)
+                    });
+                    let (built, read_ahead) = rayon::join(
+                        || self.input(input, model, border.clone()),
+                        || next.map(|next| preparing.read(next)),
+                    );
+                    ahead = read_ahead;
+                    built?
+                }
+            };
             done.blocks.extend(blocks);
             done.reports.push(report);
         }

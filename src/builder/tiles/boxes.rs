@@ -23,13 +23,13 @@ pub fn boxes(
     let dir = subsets.map(|subsets| subsets.join(BOXES_DIR));
     let mut order: Vec<usize> = (0..inputs.len()).collect();
     order.rotate_left(first);
-    let found =
-        |&at: &usize| Ok((at, known[at].map_or_else(|| find(&inputs[at], dir.as_deref()), Ok)?));
+    let found = |&at: &usize| (at, known[at].map_or_else(|| find(&inputs[at], dir.as_deref()), Ok));
     // Not in few large pieces: others are at work on the same.
-    let mut all: Vec<(usize, BoundingBox)> =
-        order.par_iter().with_max_len(1).map(found).collect::<Result<_>>()?;
+    let mut all: Vec<(usize, Result<BoundingBox>)> =
+        order.par_iter().with_max_len(1).map(found).collect();
     all.sort_by_key(|(at, _)| *at);
-    Ok(all.into_iter().map(|(_, found)| found).collect())
+    // Of several that cannot be read the first is told of.
+    all.into_iter().map(|(_, found)| found).collect()
 }
 
 fn find(input: &Path, dir: Option<&Path>) -> Result<BoundingBox> {
