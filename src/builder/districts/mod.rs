@@ -362,6 +362,10 @@ fn made_of(members: &[Tree<NodeRecord>], chunk: &Chunk<f64>) -> String {
             hasher.update(&chain.keep);
         }
     }
+    // Vertices may have been joined with those of others.
+    for at in chunk.mesh.positions.as_flattened() {
+        hasher.update(&at.to_le_bytes());
+    }
     hasher.update(&chunk.border.keep);
     for planes in &chunk.border.planes {
         hasher.update(&planes.to_le_bytes());

@@ -1,6 +1,5 @@
 //! What an input's blocks are given of its borders with other inputs.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
@@ -56,12 +55,7 @@ impl InputBorder {
     /// The planes that it has edges in: axes and coordinates.
     pub fn planes(&self) -> impl Iterator<Item = (usize, f64)> {
         let with_edges = self.planes.iter().filter(|plane| !plane.chains.is_empty());
-        let all: BTreeMap<_, _> =
-            with_edges.map(|plane| ((plane.axis, plane.coordinate.to_bits()), plane)).collect();
-        all.into_values()
-            .map(|plane| (plane.axis, plane.coordinate))
-            .collect::<Vec<_>>()
-            .into_iter()
+        with_edges.map(|plane| (plane.axis, plane.coordinate))
     }
 
     /// Gives a chunk of the input its part of it.

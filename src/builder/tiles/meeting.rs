@@ -145,15 +145,12 @@ fn keep_rule([one, other]: [&Rim; 2], constants: BorderConstants) -> KeepRule<'s
         least
     };
     let keeps: Vec<Keep> = deep.iter().enumerate().map(&mut keep).collect();
-    let [low, high] = one.bounds;
-    let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
-    let magnitude = low.into_iter().chain(high).fold(0.0, |most: f64, at| most.max(at.abs()));
     let is_locked = keeps.len() == 1 && keeps[0].most.is_infinite();
     KeepRule {
         shares: keeps.iter().map(|keep| keep.share).collect(),
         most: keeps[..keeps.len() - 1].iter().map(|keep| keep.most).collect(),
         first_level: 0,
-        collinear: if is_locked { -1.0 } else { Lattice::for_extent(extent, magnitude).step },
+        collinear: if is_locked { -1.0 } else { Lattice::for_tile(one.bounds).step },
         baked: None,
         constants,
     }
@@ -365,6 +362,11 @@ mod tests {
         Model::of_parts(vec![part])
     }
 
+    /// How high the ground is at `x` = 20.
+    fn z(y: f64) -> f64 {
+        (20.0 * 1.7f64).sin() + (y * 2.3).cos() + (20.0 * y * 0.1).sin()
+    }
+
     fn rim(model: &Model) -> Rim {
         let everywhere = [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]];
         let mut options = BuildOptions::default();
@@ -389,7 +391,6 @@ mod tests {
     fn both_sides_of_a_plane_keep_the_same() {
         let (one, other) = (ground(20, [0.0; 2], 0.0), ground(20, [20.0, 0.0], 0.0));
         let [left, right] = between([&one, &other], &[]);
-        let z = |y: f64| (20.0 * 1.7f64).sin() + (y * 2.3).cos() + (20.0 * y * 0.1).sin();
         let kept = keeps(&left, |y| [20.0, y, z(y)]);
         assert_eq!(kept, keeps(&right, |y| [20.0, y, z(y)]));
         assert_eq!((left.planes[0].axis, left.planes[0].coordinate), (0, 20.0));
@@ -405,7 +406,6 @@ mod tests {
     fn each_side_keeps_its_own_positions_where_they_nearly_agree() {
         let (one, other) = (ground(20, [0.0; 2], 0.0), ground(20, [20.0, 0.0], 0.002));
         let [left, right] = between([&one, &other], &[]);
-        let z = |y: f64| (20.0 * 1.7f64).sin() + (y * 2.3).cos() + (20.0 * y * 0.1).sin();
         let kept = keeps(&left, |y| [20.0, y, z(y)]);
         assert_eq!(kept, keeps(&right, |y| [20.0 + 0.002, y - 0.002, z(y) + 0.002]));
         assert!(kept.iter().any(|&level| level > 0));
