@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use super::choosing::Choosing;
 use super::margin::Margin;
 use super::predict::predict;
 use super::settling::Settling;
@@ -9,7 +10,7 @@ use super::steady::Steady;
 use super::{
     Backend, CostModel, FarField, FarFieldMode, FarShown, FrameEstimate, FrameInput, FrameOutcome,
     FrameReport, FrontCheck, FrontLoad, HiddenNodes, Inspect, Load, Occluders, Policy,
-    PredictedView, Residents, SeenAreas, Selection, ToggleCauses, Visibility,
+    PredictedView, Residents, SeenAreas, Selection, ToggleCauses, Visibility, geometry_load,
 };
 use crate::camera::{Pose, View};
 use crate::format::cells::Cells;
@@ -38,6 +39,8 @@ struct Seen<'a> {
     target_ms: f64,
     /// What the far field takes of the frame, milliseconds.
     far_ms: f64,
+    /// What drawing takes where all is as coarse as can be, milliseconds.
+    least_ms: f64,
     /// Seconds since the frame before began.
     dt_s: f64,
 }
@@ -55,9 +58,16 @@ impl Seen<'_> {
             memory: self.memory,
             costs: self.steady.costs(),
             target_ms: (self.target_ms - self.far_ms).max(0.0),
-            budget_ms: (self.steady.budget_ms(self.target_ms) - self.far_ms).max(0.0),
+            budget_ms: (self.budget_ms() - self.far_ms).max(0.0),
             dt_s: self.dt_s,
         }
+    }
+}
+
+impl Seen<'_> {
+    /// What drawing may be expected to take, far field included.
+    fn budget_ms(&self) -> f64 {
+        self.steady.budget_ms(self.target_ms, self.least_ms)
     }
 }
 
@@ -68,6 +78,7 @@ pub struct Engine<'a> {
     residency: Arc<Mutex<Residency>>,
     backend: &'a mut dyn Backend,
     costs: CostModel,
+    choosing: Choosing,
     margin: Margin,
     settling: Settling,
     front_load: FrontLoad,
@@ -75,6 +86,8 @@ pub struct Engine<'a> {
     far_requests: Vec<(u32, f64)>,
     /// The part of the picture that the nodes of the frame before covered, 0 to 1.
     covered: f64,
+    /// Roots in view.
+    roots: Vec<u32>,
     /// What the frame before drew, and took.
     drawn: Vec<u32>,
     /// The same with the faces of the far field.
@@ -130,18 +143,21 @@ impl<'a> Engine<'a> {
                 steady: Steady::new(&costs, margin.ratio()),
                 target_ms,
                 far_ms: 0.0,
+                least_ms: 0.0,
                 dt_s: 0.0,
             },
             policy,
             residency,
             backend,
             costs,
+            choosing: Choosing::default(),
             margin,
             settling: Settling::default(),
             front_load: FrontLoad::default(),
             far_field: None,
             far_requests: Vec::new(),
             covered: 0.0,
+            roots: Vec::new(),
             drawn: Vec::new(),
             drawn_with_faces: Vec::new(),
             load: Load::default(),
@@ -207,27 +223,13 @@ impl<'a> Engine<'a> {
         seen.visibility.begin_frame(seen.tree.len());
         let is_still =
             changes.arrived.is_empty() && self.pose == Some(view.pose) && self.margin.is_known();
-        seen.steady.follow(&self.costs, self.margin.ratio(), &self.load, is_still);
+        let choosing_ms = self.choosing.expected_ms();
+        seen.steady.follow(&self.costs, choosing_ms, self.margin.ratio(), &self.load, is_still);
 
         let before = self.backend.now_ms();
-        let Seen { tree, dt_s, .. } = self.seen;
-        if let Some(seen) = &mut self.seen.seen {
-            seen.look(tree, &view.within(None), dt_s);
-        }
-        if let Some(hidden) = &mut self.seen.hidden {
-            hidden.begin_frame(view, dt_s);
-        }
-        self.policy.select(&self.seen.from(view), &mut self.selection);
-        let front = &self.selection.front;
-        self.drawn.clear();
-        match &mut self.seen.hidden {
-            Some(hidden) => {
-                hidden.count_on(&self.selection.counted_on);
-                self.drawn.extend(hidden.drawn(self.seen.tree, front, view));
-            }
-            None => self.drawn.extend(front),
-        }
+        self.choose(view);
         report.select_ms = self.backend.now_ms() - before;
+        let front = &self.selection.front;
         self.check.check(self.seen.tree, front, view, &self.seen.residents).map_err(|fault| {
             let (policy, frame) = (self.policy.name(), self.frames);
             Error::Internal(format!("policy {policy}, frame {frame}: {fault}"))
@@ -259,6 +261,46 @@ impl<'a> Engine<'a> {
         Ok(report)
     }
 
+    /// Chooses a front, and what has to be drawn of it.
+    fn choose(&mut self, view: &View) {
+        let Seen { tree, dt_s, .. } = self.seen;
+        if let Some(seen) = &mut self.seen.seen {
+            seen.look(tree, &view.within(None), dt_s);
+        }
+        let mut took_ms = 0.0;
+        if let Some(hidden) = &mut self.seen.hidden {
+            took_ms -= self.backend.now_ms();
+            hidden.begin_frame(view, dt_s);
+            took_ms += self.backend.now_ms();
+        }
+        self.seen.least_ms = self.least_ms(view);
+        self.policy.select(&self.seen.from(view), &mut self.selection);
+        let front = &self.selection.front;
+        self.drawn.clear();
+        let Some(hidden) = &mut self.seen.hidden else {
+            self.drawn.extend(front);
+            return;
+        };
+        took_ms -= self.backend.now_ms();
+        hidden.count_on(&self.selection.counted_on);
+        self.drawn.extend(hidden.drawn(tree, front, view));
+        took_ms += self.backend.now_ms();
+        let costs = self.seen.steady.costs();
+        let sum_ms = |nodes: &[u32]| -> f64 {
+            nodes.iter().map(|&node| costs.added_ms(&geometry_load(tree.node(node)))).sum()
+        };
+        hidden.weigh(took_ms, sum_ms(front) - sum_ms(&self.drawn));
+    }
+
+    /// What drawing takes where all is as coarse as can be, milliseconds.
+    fn least_ms(&mut self, view: &View) -> f64 {
+        let Seen { tree, steady, .. } = &self.seen;
+        let is_in_view = |&root: &u32| view.frustum.outside(tree.node(root).bbox) <= 0.0;
+        self.roots.clear();
+        self.roots.extend(tree.roots().iter().copied().filter(is_in_view));
+        steady.costs().priced_ms(&self.front_load.of(tree, &self.roots, view, 0))
+    }
+
     /// The view without what faces show of it, and as much of those that are expected.
     fn look_far(&mut self, view: &View) -> View {
         let Some(far_field) = &mut self.far_field else { return *view };
@@ -276,7 +318,7 @@ impl<'a> Engine<'a> {
         let (Some(far_field), seen) = (&mut self.far_field, &self.seen) else { return };
         if far_field.is_due(seen.dt_s, seen.hidden.as_ref()) {
             let whole = view.within(None);
-            let budget_ms = seen.steady.budget_ms(seen.target_ms);
+            let budget_ms = seen.budget_ms();
             let frame = FrameInput { budget_ms, ..seen.from(&whole) };
             far_field.weigh(&frame, &self.selection.front, self.covered);
         }
@@ -312,7 +354,7 @@ impl<'a> Engine<'a> {
 
     /// Sets what was expected of a frame beside what it took, and learns from it.
     fn estimate(&mut self, view: &View, changes: &Changes, report: &mut FrameReport) {
-        let (costs, &Seen { tree, target_ms, dt_s, ref steady, .. }) =
+        let (costs, &Seen { tree, target_ms, least_ms, dt_s, ref steady, .. }) =
             (&mut self.costs, &self.seen);
         let mut whole = self.front_load.of(tree, &self.drawn, view, changes.arrived_bytes);
         let [width, height] = view.size.map(f64::from);
@@ -321,20 +363,23 @@ impl<'a> Engine<'a> {
             whole += far_field.load(view, self.covered);
         }
         let drawn = Load { uploaded_bytes: 0.0, ..whole };
+        let choosing_ms = self.choosing.expected_ms();
         let modelled = costs.estimate(&whole);
         (report.modelled_ms, report.modelled_deviation_ms) =
-            (modelled.mean_ms, modelled.deviation_ms);
+            (choosing_ms + modelled.mean_ms, modelled.deviation_ms);
         let estimate = self.selection.estimate.unwrap_or_else(|| FrameEstimate {
-            ms: costs.estimate(&drawn).mean_ms,
+            ms: choosing_ms + costs.estimate(&drawn).mean_ms,
             without_feedback_ms: costs.expected_ms(&drawn),
         });
         report.estimated_ms = estimate.ms;
         report.estimated_without_feedback_ms = estimate.without_feedback_ms;
         if self.settling.is_over(report.arrived, report.waiting, dt_s) {
-            let (expected_ms, budget_ms) = (costs.priced_ms(&drawn), steady.budget_ms(target_ms));
-            self.margin.observe(expected_ms, report.frame_ms, budget_ms, dt_s);
+            let expected_ms = choosing_ms + costs.priced_ms(&drawn);
+            let frame_ms = steady.frame_ms(target_ms, least_ms);
+            self.margin.observe(expected_ms, report.frame_ms, frame_ms, dt_s);
         }
-        costs.observe(&whole, report.frame_ms, report.gpu_ms, dt_s);
+        costs.observe(&whole, report.frame_ms - report.select_ms, report.gpu_ms, dt_s);
+        self.choosing.observe(report.select_ms, dt_s);
         self.load = drawn;
     }
 

@@ -6,6 +6,7 @@
 
 mod backend;
 mod check_front;
+mod choosing;
 mod cost_model;
 #[expect(clippy::module_inception)]
 mod engine;

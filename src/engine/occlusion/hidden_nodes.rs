@@ -21,8 +21,14 @@ const MORE_SLABS: usize = 1000;
 /// So much is hidden in streets, less from above.
 const MUCH: f64 = 0.2;
 
-/// After so many seconds it is looked for again.
+/// After so many seconds it is looked for again,
 const LOOK_AGAIN_S: f64 = 0.5;
+
+/// or after twice as many, and so on up to these, where it took longer each time than it saved.
+const LATEST_LOOK_S: f64 = 8.0;
+
+/// Frames in which what it takes and saves counts half.
+const FRAMES: f64 = 8.0;
 
 /// What is hidden is counted on after so many seconds, so that levels do not change with it.
 const STEADY_S: f64 = 0.5;
@@ -47,17 +53,18 @@ pub struct HiddenNodes {
     /// By node: when it was last found to be in sight, seconds.
     seen_s: Vec<Cell<f64>>,
     now_s: f64,
-    /// By node; of no use but while a front is compared.
-    is_in_front: Vec<bool>,
+    /// By node; of no use but while fronts are compared.
+    is_marked: Vec<Cell<bool>>,
     /// Nodes of the frame before that were drawn.
     drawn: Vec<u32>,
-    /// Whether the front to come hides other nodes than that of the frame before.
-    is_another: bool,
     /// Whether it is looked for in this frame.
     is_looked_for: bool,
     since_s: f64,
+    look_again_s: f64,
     /// What part of the triangles was hidden when it was looked for last.
     saved: f64,
+    /// Milliseconds that it saves a frame, less what it takes; once both are known.
+    gain_ms: Option<f64>,
 }
 
 impl HiddenNodes {
@@ -72,12 +79,13 @@ impl HiddenNodes {
             in_sight: Visibility::default(),
             seen_s: vec![Cell::new(f64::NEG_INFINITY); nodes],
             now_s: 0.0,
-            is_in_front: vec![false; nodes],
+            is_marked: vec![Cell::new(false); nodes],
             drawn: Vec::new(),
-            is_another: false,
             is_looked_for: true,
             since_s: 0.0,
+            look_again_s: LOOK_AGAIN_S,
             saved: 0.0,
+            gain_ms: None,
         }
     }
 
@@ -91,7 +99,7 @@ impl HiddenNodes {
     pub fn begin_frame(&mut self, view: &View, dt_s: f64) {
         self.since_s += dt_s;
         self.now_s += dt_s;
-        self.is_looked_for |= self.since_s >= LOOK_AGAIN_S;
+        self.is_looked_for |= self.since_s >= self.look_again_s;
         let drawn = std::mem::take(&mut self.drawn);
         self.look(view, &drawn);
         self.drawn = drawn;
@@ -103,12 +111,57 @@ impl HiddenNodes {
             return;
         }
         self.in_sight.begin_frame(self.nodes.len());
-        self.hiding.clear();
-        self.hiding.extend(front.iter().filter(|&&node| self.nodes[node as usize].is_some()));
-        let hiding: Vec<&NodeOcclusion> =
-            self.hiding.iter().filter_map(|&node| self.nodes[node as usize].as_deref()).collect();
+        let (mut picture, mut hiding) =
+            (std::mem::take(&mut self.picture), std::mem::take(&mut self.hiding));
+        picture.begin(view, self.near);
+        hiding.clear();
         let slabs = if self.saved < MUCH { SLABS } else { MORE_SLABS };
-        self.picture.draw(view, self.near, &hiding, slabs);
+        self.add(&mut picture, &mut hiding, front.iter().copied(), slabs);
+        (self.picture, self.hiding) = (picture, hiding);
+    }
+
+    /// Lets more nodes hide others in a picture, those that are in memory.
+    fn add(
+        &self,
+        picture: &mut HidingPicture,
+        hiding: &mut Vec<u32>,
+        nodes: impl Iterator<Item = u32>,
+        slabs: usize,
+    ) {
+        let known = |node: u32| Some((node, self.nodes[node as usize].as_deref()?));
+        let nodes: Vec<(u32, &NodeOcclusion)> = nodes.filter_map(known).collect();
+        picture.add(&nodes, slabs);
+        hiding.extend(nodes.iter().map(|&(node, _)| node));
+    }
+
+    /// Lets a picture in which `hiding` hide others show what another front hides: less than if it
+    /// were drawn anew, in a part of the time. Whether it shows anything else.
+    fn change(
+        &self,
+        tree: &SceneTree,
+        picture: &mut HidingPicture,
+        hiding: &mut Vec<u32>,
+        front: &[u32],
+        view: &View,
+    ) -> bool {
+        let marked = |node: u32| &self.is_marked[node as usize];
+        front.iter().for_each(|&node| marked(node).set(true));
+        let are_gone = hiding.iter().any(|&node| !marked(node).get());
+        if are_gone {
+            picture.remove(|node| !marked(node).get());
+            hiding.retain(|&node| marked(node).get());
+        }
+        hiding.iter().for_each(|&node| marked(node).set(false));
+        // What is hidden hides nothing more.
+        let more: Vec<u32> = front
+            .iter()
+            .copied()
+            .filter(|&node| marked(node).get() && !picture.hides(view, tree.node(node).bbox))
+            .collect();
+        front.iter().for_each(|&node| marked(node).set(false));
+        let before = hiding.len();
+        self.add(picture, hiding, more.into_iter(), MORE_SLABS);
+        are_gone || hiding.len() > before
     }
 
     /// Whether nothing of a node would be seen, or of nodes below it that are within its box.
@@ -133,10 +186,12 @@ impl HiddenNodes {
 
     /// What a front would hide, were it drawn, as far as those in memory are known to hide others.
     pub fn behind<'a>(&'a self, tree: &'a SceneTree, front: &[u32], view: &'a View) -> Behind<'a> {
-        let hiding: Vec<&NodeOcclusion> =
-            front.iter().filter_map(|&node| self.nodes[node as usize].as_deref()).collect();
-        let mut picture = HidingPicture::default();
-        picture.draw(view, self.near, &hiding, MORE_SLABS);
+        let (mut picture, mut hiding) = (self.picture.clone(), self.hiding.clone());
+        if self.view.is_none() {
+            picture.begin(view, self.near);
+            hiding.clear();
+        }
+        self.change(tree, &mut picture, &mut hiding, front, view);
         Behind { of: self, tree, view, picture }
     }
 
@@ -145,8 +200,7 @@ impl HiddenNodes {
         for &node in nodes {
             self.seen_s[node as usize].set(f64::NEG_INFINITY);
         }
-        self.is_another |= !nodes.is_empty();
-        self.is_looked_for |= self.is_another;
+        self.is_looked_for |= !nodes.is_empty();
     }
 
     fn is_out(&self, tree: &SceneTree, node: u32, view: &View, picture: &HidingPicture) -> bool {
@@ -154,6 +208,26 @@ impl HiddenNodes {
         match &self.nodes[node as usize] {
             Some(occlusion) => occlusion.all_out(is_out),
             None => is_out(tree.node(node).bbox),
+        }
+    }
+
+    /// Looking for it took so many milliseconds in this frame, and what is not drawn would have taken
+    /// so many: where that does not pay, it is not looked for in the next frames.
+    pub fn weigh(&mut self, took_ms: f64, saved_ms: f64) {
+        // Nothing hides before the first frame, which says nothing of the next.
+        if self.view.is_none() || self.hiding.is_empty() {
+            return;
+        }
+        let gain_ms = saved_ms - took_ms;
+        let mean_ms = self.gain_ms.get_or_insert(gain_ms);
+        *mean_ms += (1.0 - libm::exp2(-1.0 / FRAMES)) * (gain_ms - *mean_ms);
+        if *mean_ms >= 0.0 {
+            self.look_again_s = LOOK_AGAIN_S;
+        } else if self.is_looked_for {
+            self.is_looked_for = false;
+            self.look_again_s = (2.0 * self.look_again_s).min(LATEST_LOOK_S);
+            // The next look counts by itself.
+            self.gain_ms = None;
         }
     }
 
@@ -169,11 +243,15 @@ impl HiddenNodes {
 
     /// What has to be drawn of a front that was chosen: the same image as all of it.
     pub fn drawn(&mut self, tree: &SceneTree, front: &[u32], view: &View) -> &[u32] {
-        front.iter().for_each(|&node| self.is_in_front[node as usize] = true);
-        let all_there = self.hiding.iter().all(|&node| self.is_in_front[node as usize]);
-        front.iter().for_each(|&node| self.is_in_front[node as usize] = false);
-        if !all_there || std::mem::take(&mut self.is_another) {
+        if self.view.is_none() {
             self.look(view, front);
+        } else {
+            let (mut picture, mut hiding) =
+                (std::mem::take(&mut self.picture), std::mem::take(&mut self.hiding));
+            if self.change(tree, &mut picture, &mut hiding, front, view) {
+                self.in_sight.begin_frame(self.nodes.len());
+            }
+            (self.picture, self.hiding) = (picture, hiding);
         }
         self.drawn.clear();
         let mut drawn = std::mem::take(&mut self.drawn);
@@ -230,7 +308,7 @@ mod tests {
         let (tree, mut hidden) = row();
         hidden.begin_frame(&view(), FRAME_S);
         assert!(!hidden.hides(&tree, 1), "nothing is drawn yet");
-        assert_eq!(hidden.drawn(&tree, &[0, 1, 2], &view()), [0, 1, 2]);
+        assert_eq!(hidden.drawn(&tree, &[0, 1, 2], &view()), [0]);
         hidden.begin_frame(&view(), FRAME_S);
         assert!(hidden.hides(&tree, 1) && hidden.hides(&tree, 2) && !hidden.hides(&tree, 0));
         assert_eq!(hidden.drawn(&tree, &[2, 1, 0], &view()), [0]);
@@ -253,6 +331,27 @@ mod tests {
         let first = steady.iter().position(|&steady| steady);
         assert_eq!(first, Some((STEADY_S / FRAME_S) as usize));
         assert!(steady[first.unwrap()..].iter().all(|&steady| steady));
+    }
+
+    #[test]
+    fn where_it_takes_longer_than_it_saves_it_is_looked_for_ever_more_seldom() {
+        let (tree, mut hidden) = row();
+        let mut frames = |count: usize, took_ms: f64, saved_ms: f64| {
+            let mut frame = || {
+                hidden.begin_frame(&view(), FRAME_S);
+                hidden.drawn(&tree, &[0, 1], &view());
+                hidden.weigh(took_ms, saved_ms);
+                hidden.view.is_some()
+            };
+            (0..count).filter(|_| frame()).count()
+        };
+        assert_eq!(frames(64, 1.0, 1.5), 64);
+        let seconds = |seconds: f64| (seconds / FRAME_S) as usize;
+        let looked = frames(seconds(3.0), 1.0, 0.5);
+        assert!(looked < 16, "{looked}");
+        let looked = frames(seconds(60.0), 1.0, 0.5);
+        assert!((6..12).contains(&looked), "{looked}");
+        assert!(frames(seconds(20.0), 1.0, 3.0) > seconds(11.0), "it pays again");
     }
 
     #[test]

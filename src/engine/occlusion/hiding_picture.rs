@@ -1,7 +1,5 @@
 //! How far away what hides others is.
 
-use std::cmp::Ordering;
-
 use glam::{DVec3, Vec3};
 
 use super::node_occlusion::NodeOcclusion;
@@ -21,14 +19,27 @@ const BEHIND: f64 = 1e-4;
 /// Slabs of a smaller part of a sphere hide no cell, or nearly none.
 const LEAST_PART: f32 = 1e-4;
 
+/// Cells of a row that go through the processor side by side.
+const RUN: usize = 8;
+
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// Every so manieth slab of a node it is looked whether all others are too small.
+const LOOK_EVERY: u32 = 16;
+
 /// How far away what hides others is, by cells of the image, each of which is wholly before what is
 /// farther.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HidingPicture {
     /// One over metres along the line of sight, row by row from the upper left; 0 where nothing hides.
     inverse: Vec<f32>,
+    /// By cell: the node that hides what is farther.
+    by: Vec<u32>,
     columns: usize,
     rows: usize,
+    /// Cells of a row and what is left of its last [run](RUN).
+    stride: usize,
     eye: DVec3,
     /// Right, down and forward, so that the first two over the third are pixels from the middle.
     axes: [DVec3; 3],
@@ -38,30 +49,44 @@ pub(super) struct HidingPicture {
     near: f64,
     /// Slabs by the part of the view that they take, with the node that they are of.
     candidates: Vec<(f32, u32, u32)>,
+    /// By row: where the slab that is drawn begins and ends, in cells.
+    ends: [Vec<f64>; 2],
 }
 
 /// a x + b y + c, with x and y in cells from the upper left.
 type Linear = [f64; 3];
 
 impl HidingPicture {
-    /// Draws what of a view is hidden by nodes, of which nothing nearer than `near` metres is drawn: by so
-    /// many of their slabs, the largest in the image.
-    pub fn draw(&mut self, view: &View, near: f64, nodes: &[&NodeOcclusion], slabs: usize) {
+    /// Begins the picture of a view, in which nothing hides yet; nothing nearer than `near` metres is
+    /// drawn.
+    pub fn begin(&mut self, view: &View, near: f64) {
         let size = view.size.map(f64::from);
         self.size = size;
         [self.columns, self.rows] = size.map(|pixels| (pixels / CELL).ceil() as usize);
+        self.stride = self.columns.next_multiple_of(RUN);
         self.inverse.clear();
-        self.inverse.resize(self.columns * self.rows, 0.0);
+        self.inverse.resize(self.stride * self.rows, 0.0);
+        self.by.clear();
+        self.by.resize(self.stride * self.rows, NONE);
         let [across, up] = view.frustum.across();
         self.eye = view.pose.position;
         self.axes = [across * (size[0] / 2.0), -up * (size[1] / 2.0), view.frustum.forward];
         self.near = near;
+    }
+
+    /// Draws what more nodes hide, by so many of their slabs, the largest in the image.
+    pub fn add(&mut self, nodes: &[(u32, &NodeOcclusion)], slabs: usize) {
         let sides = self.sides();
         let mut candidates = std::mem::take(&mut self.candidates);
         candidates.clear();
-        for (node, occlusion) in (0..).zip(nodes) {
+        for (node, &(_, occlusion)) in (0..).zip(nodes) {
             let offset = (occlusion.origin - self.eye).as_vec3();
-            for (at, slab) in (0..).zip(&occlusion.slabs) {
+            let squared = occlusion.squared_distance(self.eye) as f32;
+            for (at, slab) in (0u32..).zip(&occlusion.slabs) {
+                // The largest are first.
+                if at.is_multiple_of(LOOK_EVERY) && slab.area() < LEAST_PART * squared {
+                    break;
+                }
                 let part = slab.part_of_view(slab.middle + offset);
                 if part > LEAST_PART && is_in_view(&sides, slab, offset) {
                     candidates.push((part, node, at));
@@ -76,10 +101,20 @@ impl HidingPicture {
             candidates.truncate(slabs);
         }
         for &(_, node, at) in &candidates {
-            let occlusion = nodes[node as usize];
-            self.draw_slab(&occlusion.slabs[at as usize], occlusion.origin - self.eye);
+            let (by, occlusion) = nodes[node as usize];
+            self.draw_slab(&occlusion.slabs[at as usize], occlusion.origin - self.eye, by);
         }
         self.candidates = candidates;
+    }
+
+    /// Forgets what nodes hide of which `is_gone` says so. What is farther than these and hidden by others
+    /// as well is forgotten with them.
+    pub fn remove(&mut self, is_gone: impl Fn(u32) -> bool) {
+        for (inverse, by) in self.inverse.iter_mut().zip(&mut self.by) {
+            if *by != NONE && is_gone(*by) {
+                (*inverse, *by) = (0.0, NONE);
+            }
+        }
     }
 
     /// Normals of the planes through the eye between which the view is, which point into it: its four
@@ -95,7 +130,7 @@ impl HidingPicture {
         DVec3::from_array(self.axes.map(|axis| axis.dot(at)))
     }
 
-    fn draw_slab(&mut self, slab: &Slab, offset: DVec3) {
+    fn draw_slab(&mut self, slab: &Slab, offset: DVec3, by: u32) {
         let middle = slab.middle.as_dvec3() + offset;
         let across = slab.half_across.as_dvec3();
         // On which side the eye is, and whether it is out of the slab at all.
@@ -126,7 +161,7 @@ impl HidingPicture {
         let [a, b, c] = one_over_depth(&front).to_array();
         bounds[8] = self.least_in_cells(DVec3::new(-a, -b, (1.0 - BEHIND) / self.near - c), 0.0);
         let farthest = self.least_in_cells(one_over_depth(&back), 0.0);
-        self.fill(self.rows_of(&[front, back]), &bounds, &farthest);
+        self.fill(self.rows_of(&[front, back]), &bounds, &farthest, by);
     }
 
     /// The rows in which a slab may be.
@@ -156,38 +191,70 @@ impl HidingPicture {
     }
 
     /// Hides what is farther than `farthest` in the cells in which all bounds are above 0.
-    fn fill(&mut self, rows: std::ops::Range<usize>, bounds: &[Linear], farthest: &Linear) {
+    fn fill(
+        &mut self,
+        rows: std::ops::Range<usize>,
+        bounds: &[Linear; 9],
+        farthest: &Linear,
+        by: u32,
+    ) {
         if !bounds.iter().chain([farthest]).flatten().all(|number| number.is_finite()) {
             return;
         }
-        let slope = farthest[0] as f32;
-        // Each bound is a line; where it meets a row. Those along the rows bound these themselves.
-        let mut lines = [[f64::NEG_INFINITY, 0.0], [f64::INFINITY, 0.0]].map(|line| [line; 9]);
-        let mut along = [[0.0, 1.0]; 9];
-        for (at, &[a, b, c]) in bounds.iter().enumerate() {
-            match a.total_cmp(&0.0) {
-                _ if a == 0.0 => along[at] = [b, c],
-                Ordering::Greater => lines[0][at] = [-c / a, -b / a],
-                _ => lines[1][at] = [-c / a, -b / a],
+        let last = self.columns as f64 - 1.0;
+        let [left, right] = &mut self.ends;
+        for (ends, end) in [(&mut *left, 0.0), (&mut *right, last)] {
+            ends.clear();
+            ends.resize(rows.len(), end);
+        }
+        // Each bound is a line; where it meets a row. Line by line, since rows go through the processor
+        // side by side; not by `max` and `min`, which look for what is no number.
+        let first = rows.start as f64;
+        let row = |at: usize| first + f64::from(at as i32);
+        for &[a, b, c] in bounds {
+            if a == 0.0 {
+                // Along the rows, it bounds these themselves.
+                for (at, end) in left.iter_mut().enumerate() {
+                    *end = if b * row(at) + c > 0.0 { *end } else { f64::INFINITY };
+                }
+                continue;
+            }
+            let [from, slope] = [-c / a, -b / a];
+            if a > 0.0 {
+                for (at, end) in left.iter_mut().enumerate() {
+                    let meets = from + slope * row(at);
+                    *end = if meets > *end { meets } else { *end };
+                }
+            } else {
+                for (at, end) in right.iter_mut().enumerate() {
+                    let meets = from + slope * row(at);
+                    *end = if meets < *end { meets } else { *end };
+                }
             }
         }
-        for row in rows {
-            let y = row as f64;
-            if along.iter().any(|[b, c]| b * y + c <= 0.0) {
+        let slope = farthest[0] as f32;
+        for (row, (&left, &right)) in rows.zip(left.iter().zip(&*right)) {
+            // Not by `ceil`, which is a call where a processor may have no instruction for it.
+            let from = left as usize;
+            let from = from + usize::from((from as f64) < left);
+            if left > right || from as f64 > right {
                 continue;
             }
-            let column = |[from, slope]: &[f64; 2]| from + slope * y;
-            let left = lines[0].iter().map(column).fold(0.0, f64::max).ceil();
-            let last = self.columns as f64 - 1.0;
-            let right = lines[1].iter().map(column).fold(last, f64::min);
-            if left > right {
-                continue;
-            }
-            let (from, to) = (left as usize, right as usize + 1);
-            let start = (farthest[1] * y + farthest[2]) as f32;
-            let cells = &mut self.inverse[row * self.columns..][from..to];
-            for (column, cell) in (from..to).zip(cells) {
-                *cell = cell.max(start + slope * column as f32);
+            let (from, to) = (from as i32, right as i32 + 1);
+            let start = (farthest[1] * row as f64 + farthest[2]) as f32;
+            let runs = row * self.stride / RUN..(row + 1) * self.stride / RUN;
+            let of_row = self.inverse.as_chunks_mut::<RUN>().0[runs.clone()].iter_mut();
+            let of_row = of_row.zip(&mut self.by.as_chunks_mut::<RUN>().0[runs]);
+            let to_run = (to as usize).div_ceil(RUN);
+            for (run, (inverse, owner)) in of_row.enumerate().take(to_run).skip(from as usize / RUN)
+            {
+                for at in 0..RUN {
+                    let column = (run * RUN + at) as i32;
+                    let here = start + slope * column as f32;
+                    let is_nearer = (here > inverse[at]) & (column >= from) & (column < to);
+                    inverse[at] = if is_nearer { here } else { inverse[at] };
+                    owner[at] = if is_nearer { by } else { owner[at] };
+                }
             }
         }
     }
@@ -211,8 +278,9 @@ impl HidingPicture {
         let columns = cells(across[0], across[1], 0, self.columns);
         // Rows are from above.
         cells(-up[1], -up[0], 1, self.rows).all(|row| {
-            let cells = &self.inverse[row * self.columns..][columns.clone()];
-            cells.iter().all(|&cell| cell >= inverse)
+            let cells = &self.inverse[row * self.stride..][columns.clone()];
+            // All of them, side by side.
+            cells.iter().fold(true, |all, &cell| all & (cell >= inverse))
         })
     }
 }
@@ -260,7 +328,8 @@ mod tests {
     fn picture(view: &View, triangles: &[[[f32; 3]; 3]]) -> HidingPicture {
         let mut picture = HidingPicture::default();
         let node = NodeOcclusion::new(&mesh(triangles), UpAxis::Z);
-        picture.draw(view, NEAR, &[&node], 1000);
+        picture.begin(view, NEAR);
+        picture.add(&[(0, &node)], 1000);
         picture
     }
 
@@ -295,7 +364,8 @@ mod tests {
             let mut mesh = mesh(&wall(distance, 2.0));
             mesh.primitives[0].surface.double_sided = double_sided;
             let mut picture = HidingPicture::default();
-            picture.draw(&view, NEAR, &[&NodeOcclusion::new(&mesh, UpAxis::Z)], 1000);
+            picture.begin(&view, NEAR);
+            picture.add(&[(0, &NodeOcclusion::new(&mesh, UpAxis::Z))], 1000);
             picture.hides(&view, cube([3.0 * f64::from(distance), 0.0, 0.0], 1.0))
         };
         assert!(hides(10.0, true) && !hides(10.0, false), "it looks away");

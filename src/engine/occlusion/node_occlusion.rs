@@ -28,7 +28,7 @@ fn most_slabs(triangles: usize) -> usize {
 pub struct NodeOcclusion {
     /// Source coordinates from which everything else is metres away.
     pub(super) origin: DVec3,
-    /// Behind these nothing is seen.
+    /// Behind these nothing is seen; the largest first.
     pub(super) slabs: Vec<Slab>,
     /// Boxes around all of it, and around its parts.
     pieces: Pieces,
@@ -50,6 +50,15 @@ impl NodeOcclusion {
         let triangles = triangles as usize;
         let slabs = most_slabs(triangles) * size_of::<Slab>() + size_of::<Self>();
         slabs as u64 + Pieces::most_bytes(triangles)
+    }
+
+    /// Squared metres from a place to the box around all of it; 0 where there is none.
+    pub(super) fn squared_distance(&self, from: DVec3) -> f64 {
+        self.pieces.get(0).map_or(0.0, |whole| {
+            let from = from - self.origin;
+            let [min, max] = self.pieces.bbox(whole);
+            from.distance_squared(from.clamp(min, max))
+        })
     }
 
     /// Whether all of it is in boxes of which `is_out` says that nothing in them is seen; not where there
