@@ -7,6 +7,7 @@
 
 pub mod bench;
 pub mod builder;
+pub mod bytes;
 pub mod camera;
 pub mod cells;
 pub mod city;

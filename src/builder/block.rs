@@ -33,7 +33,7 @@ use crate::report::build_report::{BlockCut, LeftOutNode};
 use crate::texture::TextureCache;
 
 /// A block whose nodes are written.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct BuiltBlock {
     /// For `scene.hlod`.
     pub info: BlockInfo,

@@ -5,22 +5,27 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use crate::Result;
+use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
 use crate::report::build_report::{FileReport, InputReport};
 
 /// Sizes and hashes of the files of an input.
-pub fn describe(dependencies: &[PathBuf], stages: &Stages) -> Result<Vec<FileReport>> {
-    let describe = |path: &PathBuf| stages.time(Stage::Compare, || FileReport::read(path));
+pub fn describe(
+    dependencies: &[PathBuf],
+    sources: &Sources,
+    stages: &Stages,
+) -> Result<Vec<FileReport>> {
+    let describe = |path: &PathBuf| stages.time(Stage::Compare, || sources.report(path));
     dependencies.par_iter().map(describe).collect()
 }
 
 /// True where every file of an input is as it was.
-pub fn unchanged(earlier: &InputReport) -> bool {
+pub fn unchanged(earlier: &InputReport, sources: &Sources) -> bool {
     !earlier.files.is_empty()
         && earlier.files.par_iter().all(|file| {
             let path = Path::new(&file.path);
             let size = std::fs::metadata(path).map_or(0, |facts| facts.len());
-            size == file.bytes && FileReport::read(path).is_ok_and(|now| now == *file)
+            size == file.bytes && sources.report(path).is_ok_and(|now| now == *file)
         })
 }
 

@@ -1,6 +1,7 @@
 //! From imported models to nodes on disk.
 //!
 //! - [`pipeline`]: the whole build; [`mod@prepare`]: an input as it is built; [`block`]: to the trees of its blocks
+//! - [`sources`]: what is read as one input: files, and tiles of large ones
 //! - [`subset`] and [`merge`]: shares of a build for several machines, and one result of all of them
 //! - [`districts`]: nodes above the blocks, made from these nodes' files
 //! - [`blocks`]: what a block is: groups merged, divided and gathered
@@ -18,6 +19,7 @@ pub mod block;
 pub mod block_setup;
 pub mod blocks;
 pub mod border;
+mod checkpoint;
 pub mod constants;
 pub mod cut;
 pub mod districts;
@@ -34,6 +36,7 @@ pub mod prepare;
 pub mod progress;
 pub mod reuse;
 pub mod simplify;
+pub mod sources;
 pub mod stages;
 pub mod stitch;
 pub mod subset;

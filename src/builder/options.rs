@@ -3,6 +3,8 @@
 use crate::builder::blocks::plan::BlockMode;
 use crate::builder::hierarchy::HierarchyOptions;
 use crate::builder::simplify::collapse::AppearanceWeights;
+use crate::bytes::Bytes;
+use crate::import::tiling::TILE_VERTICES;
 use crate::lattice::{Quantization, STEPS};
 use crate::mesh::UpAxis;
 use crate::place::{PLACEMENT, Placement, placement_of};
@@ -32,9 +34,17 @@ pub struct BuildOptions {
     pub textured_weight: f64,
     /// Whether there are nodes above the blocks ([`crate::builder::districts`]).
     pub districts: bool,
+    /// Keep to so many bytes of memory, [`LEAST_MEMORY`] or more: files that are large are built tile by tile
+    /// ([`tiling`](crate::import::tiling)). Results are the same for any number, and not those without.
+    pub max_memory: Option<u64>,
+    /// Go on from what a build that was stopped had finished, and leave what is finished where this one is.
+    pub resume: bool,
     /// Build even where nothing has changed.
     pub force: bool,
 }
+
+/// No build can keep to less memory, bytes.
+pub const LEAST_MEMORY: u64 = 128 << 20;
 
 impl Default for BuildOptions {
     fn default() -> Self {
@@ -49,6 +59,8 @@ impl Default for BuildOptions {
             compress: false,
             textured_weight: crate::format::attributes::TEXTURED_WEIGHT,
             districts: true,
+            max_memory: None,
+            resume: false,
             force: false,
         }
     }
@@ -70,6 +82,11 @@ impl BuildOptions {
         range("JPEG quality", f64::from(self.jpeg_quality), 1.0, 100.0)?;
         range("largest atlas", f64::from(self.max_atlas), 16.0, 65535.0)?;
         range("textured weight", self.textured_weight, 0.0, 1.0)?;
+        let least = Bytes(LEAST_MEMORY);
+        if let Some(bytes) = self.max_memory.filter(|bytes| *bytes < least.0) {
+            let what = format!("memory of at most {}, expected {least} or more", Bytes(bytes));
+            return Err(Error::Usage(what));
+        }
         let [least, most] = STEPS;
         self.quantize.map_or(Ok(()), |metres| range("quantization step", metres, least, most))
     }
@@ -104,6 +121,9 @@ impl BuildOptions {
         }
         if self.compress {
             parameters["compress"] = "meshopt".into();
+        }
+        if self.max_memory.is_some() {
+            parameters[TILES] = TILE_VERTICES.into();
         }
         if self.placement != Placement::Local {
             parameters[PLACEMENT] = serde_json::json!(self.placement);
@@ -141,6 +161,9 @@ impl BuildOptions {
             compress: parameters.get("compress").is_some(),
             textured_weight: read(parameters, "textured_weight")?,
             districts: districts == "on",
+            // Tiles do not depend on how much it is.
+            max_memory: parameters.get(TILES).map(|_| u64::MAX),
+            resume: false,
             force: false,
         };
         options.check()?;
@@ -150,6 +173,9 @@ impl BuildOptions {
         }
     }
 }
+
+/// Vertices of the tiles of a large file, where it was divided.
+const TILES: &str = "tile_vertices";
 
 fn read<T: serde::de::DeserializeOwned>(parameters: &serde_json::Value, name: &str) -> Result<T> {
     T::deserialize(&parameters[name]).map_err(|error| unknown(name, &error))
@@ -200,6 +226,7 @@ mod tests {
             quantize: Some(0.01),
             compress: true,
             districts: false,
+            max_memory: Some(LEAST_MEMORY),
             ..BuildOptions::default()
         };
         for options in [BuildOptions::default(), other] {

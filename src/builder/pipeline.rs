@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::builder::block::{BuiltBlock, build_input};
 use crate::builder::block_setup::Target;
+use crate::builder::checkpoint::Checkpoints;
 use crate::builder::districts::{Above, Districts, build_districts};
 use crate::builder::emit::disk_sink::{NodeRecord, check_unique};
 use crate::builder::emit::forest::{append_nodes, make_errors_monotone, set_block};
@@ -23,12 +24,14 @@ use crate::builder::progress::Progress;
 use crate::builder::reuse::Earlier;
 use crate::builder::simplify::ladder::BUDGET_TOLERANCE;
 use crate::builder::simplify::simplified::LadderStep;
+use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
 use crate::builder::subset::Subset;
 use crate::builder::tiles::border::InputBorder;
+use crate::cpu_time::CpuTime;
 use crate::format::{
     BlockInfo, Node, OutputDir, REPORT_FILE, SCENE_FILE, SUBSETS_DIR, Scene, SharedTexture,
-    check_apart, fits_in_steps,
+    Unfinished, check_apart, fits_in_steps,
 };
 use crate::lattice::Quantization;
 use crate::mesh::{UpAxis, Warnings};
@@ -119,27 +122,40 @@ fn run(
     let begin = Instant::now();
     options.check()?;
     let globe = options.placement.globe()?;
-    let all_inputs = import::find_inputs(arguments)?;
+    let files = import::find_inputs(arguments)?;
     // A folder that was given counts as a whole: what is built into it would be an input the next
     // time.
-    check_apart(out, arguments.iter().chain(&all_inputs))?;
+    check_apart(out, arguments.iter().chain(&files))?;
+    let target = subset.map_or_else(|| out.to_owned(), |subset| subset.dir(out));
+    let stages = Stages::default();
+    let parameters = options.to_json();
+    let unfinished = if options.resume { Unfinished::find(&target) } else { None };
+
+    // What a subset has not built before may be in the result of a merge.
+    let open = |dir: &Path| Earlier::open(dir, &parameters);
+    let known = || open(&target).or_else(|| open(out));
+    let stopped = || unfinished.as_ref().and_then(|unfinished| open(unfinished.path()));
+    let earlier = if options.force { None } else { stopped().or_else(known) };
+    let cpu_time = CpuTime::default();
+    let folder = existing_folder(&target);
+    let (sources, all_inputs) =
+        Sources::divide(files, options, earlier.as_ref(), &folder, &cpu_time, progress)?;
+    stages.add(Stage::Import, cpu_time.total());
     let inputs = match subset {
-        Some(subset) => subset.pick(&all_inputs)?,
+        Some(subset) => subset.pick(&all_inputs, &sources)?,
         None => all_inputs.clone(),
     };
-    let target = subset.map_or_else(|| out.to_owned(), |subset| subset.dir(out));
     let part = subset.map(|subset| SubsetReport {
         subset,
         all_inputs: all_inputs.iter().map(|input| text_of(input)).collect(),
     });
-    let stages = Stages::default();
-    let parameters = options.to_json();
-
-    // What a subset has not built before may be in the result of a merge.
-    let open = |dir: &Path| Earlier::open(dir, &parameters);
-    let earlier = if options.force { None } else { open(&target).or_else(|| open(out)) };
-    let preparing =
-        Preparing { options, globe: globe.as_ref(), stages: &stages, inputs: all_inputs.len() };
+    let preparing = Preparing {
+        options,
+        sources: &sources,
+        globe: globe.as_ref(),
+        stages: &stages,
+        inputs: all_inputs.len(),
+    };
     let beside = subset.map(|_| out.join(SUBSETS_DIR));
     let Plan { still_good, borders, prepared } =
         Plan::new(&all_inputs, &inputs, beside.as_deref(), earlier.as_ref(), &preparing, progress)?;
@@ -166,7 +182,17 @@ fn run(
     progress.finishing();
     let report = run.finish(done, earlier.as_ref(), parameters, part, begin)?;
     output.commit()?;
+    if let Some(unfinished) = unfinished {
+        unfinished.remove();
+    }
     Ok(Outcome::Built(report))
+}
+
+/// The folder in which an output will stand, or the nearest above it that is there.
+fn existing_folder(out: &Path) -> PathBuf {
+    let path = std::path::absolute(out).unwrap_or_else(|_| out.to_path_buf());
+    let above = path.ancestors().skip(1).find(|folder| folder.is_dir());
+    above.map_or_else(|| PathBuf::from("."), Path::to_path_buf)
 }
 
 /// What all steps of a build share.
@@ -181,11 +207,11 @@ struct Run<'a> {
 
 /// What has come of inputs, in their order.
 #[derive(Default)]
-struct Done {
-    reports: Vec<InputReport>,
-    blocks: Vec<BuiltBlock>,
+pub(super) struct Done {
+    pub(super) reports: Vec<InputReport>,
+    pub(super) blocks: Vec<BuiltBlock>,
     /// Shared textures of earlier results, by name.
-    reused_textures: BTreeMap<String, SharedTexture>,
+    pub(super) reused_textures: BTreeMap<String, SharedTexture>,
     /// Texels of repeating textures that sources of subsets use.
     repeating_texels: u64,
 }
@@ -212,6 +238,7 @@ impl Run<'_> {
         preparing: &Preparing,
     ) -> Result<Done> {
         let mut done = Done::default();
+        let mut checkpoints = Checkpoints::new(self.options);
         // What was read already is small, and several are built at a time: one alone may be a block or two.
         let mut together = Vec::new();
         for ((input, border), report) in inputs.iter().zip(&borders).zip(still_good) {
@@ -220,7 +247,7 @@ impl Run<'_> {
             }
         }
         let build = |(input, prepared, border): (&PathBuf, Prepared, &InputBorder)| {
-            (input.clone(), self.input(input, prepared, border.clone()))
+            (input.clone(), self.input(input, prepared, border.clone(), preparing.sources))
         };
         let mut together: BTreeMap<PathBuf, Result<_>> =
             together.into_par_iter().with_max_len(1).map(build).collect();
@@ -238,10 +265,12 @@ impl Run<'_> {
                     // Only the input that comes next in turn, and only where both fit in memory.
                     let is_next = still_good.get(number + 1).is_some_and(Option::is_none);
                     let next = inputs.get(number + 1).filter(|next| {
-                        is_next && !together.contains_key(*next) && fits_beside(input, next)
+                        is_next
+                            && !together.contains_key(*next)
+                            && fits_beside(input, next, preparing)
                     });
                     let (built, read_ahead) = rayon::join(
-                        || self.input(input, model, border.clone()),
+                        || self.input(input, model, border.clone(), preparing.sources),
                         || next.map(|next| preparing.read(next)),
                     );
                     ahead = read_ahead;
@@ -250,6 +279,7 @@ impl Run<'_> {
             };
             done.blocks.extend(blocks);
             done.reports.push(report);
+            checkpoints.finished(&done, self.output)?;
         }
         Ok(done)
     }
@@ -260,6 +290,7 @@ impl Run<'_> {
         input: &Path,
         prepared: Prepared,
         border: InputBorder,
+        sources: &Sources,
     ) -> Result<(Vec<BuiltBlock>, InputReport)> {
         let &Self { options, output, stages, progress, .. } = self;
         let Prepared { model, up, up_from, triangles, collapsed } = prepared;
@@ -269,7 +300,7 @@ impl Run<'_> {
         let target = Target { options, out: output, shared: &self.shared, stages, progress };
         let (built, files) = rayon::join(
             || build_input(model, up, &border, target),
-            || describe(&dependencies, stages),
+            || describe(&dependencies, sources, stages),
         );
         let (built, files) = (built?, files?);
         let mut warnings = built.warnings;
@@ -367,8 +398,8 @@ impl Run<'_> {
             districts,
             warnings: Count::of_warnings(&warnings),
         };
-        self.output.write(SCENE_FILE, &scene.to_bytes()?)?;
-        self.output.write(REPORT_FILE, report.to_json()?.as_bytes())?;
+        self.output.write_over(SCENE_FILE, &scene.to_bytes()?)?;
+        self.output.write_over(REPORT_FILE, report.to_json()?.as_bytes())?;
         Ok(report)
     }
 }
@@ -390,7 +421,10 @@ fn warnings(reports: &[InputReport], earlier: Option<&Earlier>, globe: Option<&G
     for warning in reports.iter().flat_map(|input| &input.warnings) {
         warnings.add(&warning.text, warning.count);
     }
-    if earlier.is_some_and(|earlier| earlier.report.tilesets.is_empty()) {
+    // What a build that was stopped leaves has none either.
+    let has_none =
+        |earlier: &Earlier| earlier.report.tilesets.is_empty() && !earlier.is_unfinished();
+    if earlier.is_some_and(has_none) {
         let file = crate::format::TILESET_FILE;
         let text =
             format!("earlier result without {file} (by an older version): added to its nodes");
@@ -414,9 +448,12 @@ fn quantized(scene: &Scene, quantization: Quantization) -> Quantized {
 
 /// An input is read while the one before it is built, unless both are large: a file's model takes
 /// about as many bytes as its text.
-fn fits_beside(current: &Path, next: &Path) -> bool {
-    let bytes = |path: &Path| std::fs::metadata(path).map_or(0, |facts| facts.len());
-    bytes(current) + bytes(next) <= crate::builder::memory::total_bytes() / 16
+fn fits_beside(current: &Path, next: &Path, preparing: &Preparing) -> bool {
+    let bytes = preparing.sources.bytes(current) + preparing.sources.bytes(next);
+    match preparing.options.max_memory {
+        Some(memory) => bytes <= memory / 4,
+        None => bytes <= crate::builder::memory::total_bytes() / 16,
+    }
 }
 
 /// One direction for the whole scene; the first input's where they differ.
@@ -457,7 +494,7 @@ fn most_frequent(counts: impl IntoIterator<Item = Count>) -> Vec<Count> {
 }
 
 /// The nodes that have more triangles than they may, by id.
-fn over_budget(trees: &[Tree<NodeRecord>], warnings: &mut Warnings) -> Vec<OverBudget> {
+pub(super) fn over_budget(trees: &[Tree<NodeRecord>], warnings: &mut Warnings) -> Vec<OverBudget> {
     let mut over_budget = Vec::new();
     for tree in trees {
         tree.for_each(&mut |record: &NodeRecord| {
@@ -483,7 +520,7 @@ fn over_budget(trees: &[Tree<NodeRecord>], warnings: &mut Warnings) -> Vec<OverB
 }
 
 /// The nodes with textures of their own, by id.
-fn baked(trees: &[Tree<NodeRecord>]) -> Vec<Baked> {
+pub(super) fn baked(trees: &[Tree<NodeRecord>]) -> Vec<Baked> {
     let mut baked = Vec::new();
     for tree in trees {
         tree.for_each(&mut |record: &NodeRecord| {
@@ -496,7 +533,7 @@ fn baked(trees: &[Tree<NodeRecord>]) -> Vec<Baked> {
 }
 
 /// The trees of blocks, which know the numbers of their blocks, and what these are.
-fn numbered(blocks: Vec<BuiltBlock>) -> (Vec<BlockInfo>, Vec<Tree<NodeRecord>>) {
+pub(super) fn numbered(blocks: Vec<BuiltBlock>) -> (Vec<BlockInfo>, Vec<Tree<NodeRecord>>) {
     let mut infos = Vec::with_capacity(blocks.len());
     let mut all = Vec::with_capacity(blocks.len());
     for (number, BuiltBlock { info, mut trees }) in (0u32..).zip(blocks) {
@@ -511,7 +548,7 @@ fn numbered(blocks: Vec<BuiltBlock>) -> (Vec<BlockInfo>, Vec<Tree<NodeRecord>>) 
 }
 
 /// Joins trees to a scene.
-fn scene_of(
+pub(super) fn scene_of(
     blocks: Vec<BlockInfo>,
     trees: Vec<Tree<NodeRecord>>,
     shared_textures: BTreeMap<String, SharedTexture>,

@@ -16,7 +16,7 @@ use crate::builder::tiles::boxes::boxes;
 use crate::builder::tiles::rim::BoundingBox;
 use crate::report::build_report::InputReport;
 
-/// Models of inputs that have a share of so much of the machine's memory, as files, are read once.
+/// Models of inputs that have a share of so much of the memory, as files, are read once.
 const KEPT: u64 = 64;
 
 /// What is to be done about each input of a build, or of a share of it.
@@ -41,7 +41,7 @@ impl Plan {
     ) -> Result<Self> {
         let same = |input: &PathBuf| {
             let report = earlier?.input(&text_of(input))?;
-            unchanged(report).then(|| report.clone())
+            unchanged(report, preparing.sources).then(|| report.clone())
         };
         let compare = || inputs.iter().map(same).collect::<Vec<Option<InputReport>>>();
         let mut still_good = preparing.stages.time(Stage::Compare, compare);
@@ -61,7 +61,7 @@ impl Plan {
             known[place] = report.as_ref().and_then(|report| report.bounds);
         }
         let first = places.first().copied().unwrap_or(0);
-        let boxes = boxes(all, &known, subsets, first)?;
+        let boxes = boxes(all, &known, preparing.sources, subsets, first)?;
         let mut tiles = Tiles::new(all, boxes, preparing.options);
         let is_changed = |place: usize| known[place].is_none();
         // One that met an input that is gone, too.
@@ -79,9 +79,12 @@ impl Plan {
         };
         let in_question: BTreeSet<usize> =
             places.iter().zip(&still_good).filter_map(in_question).collect();
-        // What is read for its border is kept to be built, where all of it is small.
-        let bytes = |input: &PathBuf| std::fs::metadata(input).map_or(0, |facts| facts.len());
-        let keep = all.iter().map(bytes).sum::<u64>() <= total_bytes() / KEPT;
+        // What is read for its border is kept to be built, where all of it is small; all of it is built
+        // together then, which leaves nothing finished before the end.
+        let bytes = |input: &PathBuf| preparing.sources.bytes(input);
+        let memory = preparing.options.max_memory.unwrap_or_else(total_bytes);
+        let is_small = all.iter().map(bytes).sum::<u64>() <= memory / KEPT;
+        let keep = is_small && !preparing.options.resume;
         let mut prepared: BTreeMap<PathBuf, Prepared> = BTreeMap::new();
         tiles.read_rims(in_question.iter().copied(), |place, rim| {
             progress.comparing(&all[place]);

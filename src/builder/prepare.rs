@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use crate::builder::options::BuildOptions;
+use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
 use crate::cpu_time::CpuTime;
 use crate::lattice::{Lattice, Quantization};
 use crate::mesh::{Model, UpAxis};
 use crate::place::{Globe, z_up};
 use crate::report::build_report::UpFrom;
-use crate::{Error, Result, import};
+use crate::{Error, Result};
 
 /// A model that was prepared.
 pub struct Prepared {
@@ -30,6 +31,8 @@ pub struct Prepared {
 pub struct Preparing<'a> {
     /// What was asked for.
     pub options: &'a BuildOptions,
+    /// Where inputs are read from.
+    pub sources: &'a Sources,
     /// Where the city is.
     pub globe: Option<&'a Globe>,
     /// Where the time goes.
@@ -41,9 +44,9 @@ pub struct Preparing<'a> {
 impl Preparing<'_> {
     /// Reads an input.
     pub fn read(&self, input: &Path) -> Result<Prepared> {
-        let &Self { options, globe, stages, inputs } = self;
+        let &Self { options, sources, globe, stages, inputs } = self;
         let cpu_time = CpuTime::default();
-        let model = import::load_timed(input, &cpu_time);
+        let model = sources.load(input, &cpu_time);
         stages.add(Stage::Import, cpu_time.total());
         let mut model = model?;
         let triangles = model.triangle_count() as u64;
@@ -52,7 +55,10 @@ impl Preparing<'_> {
             (None, Some(up)) => (up, UpFrom::Format),
             // Degrees beside metres have no shape.
             (None, None) if options.placement.is_degrees() => (UpAxis::Z, UpFrom::Degrees),
-            (None, None) => (crate::builder::up::guess(&model), UpFrom::Shape),
+            (None, None) => {
+                let known = sources.up_of(input);
+                (known.unwrap_or_else(|| crate::builder::up::guess(&model)), UpFrom::Shape)
+            }
         };
         options.placement.localise(&mut model, up)?;
         check_place(&model, up, globe)?;

@@ -6,6 +6,8 @@ use std::path::Path;
 pub trait Progress: Sync {
     /// An input is being read; `number` counts from 1.
     fn reading(&self, _input: &Path, _number: usize, _of: usize) {}
+    /// An input that is too large to be read whole is being divided.
+    fn dividing(&self, _input: &Path) {}
     /// An input is being read to see where it meets others.
     fn comparing(&self, _input: &Path) {}
     /// Triangles that are known of now.

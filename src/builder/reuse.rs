@@ -66,6 +66,11 @@ impl Earlier {
         Some(Self { dir: dir.to_path_buf(), scene, report, tileset })
     }
 
+    /// Whether it is what a build that was stopped had finished: every whole result has levels.
+    pub fn is_unfinished(&self) -> bool {
+        self.report.levels.is_empty()
+    }
+
     /// What it knows of an input.
     pub fn input(&self, path: &str) -> Option<&InputReport> {
         self.report.inputs.iter().find(|input| input.path == path)

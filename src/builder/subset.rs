@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use crate::builder::sources::Sources;
 use crate::format::SUBSETS_DIR;
 use crate::{Error, Result};
 
@@ -56,15 +57,14 @@ impl Subset {
     /// Those of all inputs that are of this share: the same on every machine that sees the same files.
     /// They follow one another, since names of tiles that do so are mostly those of neighbours, whose common
     /// borders then are of one share; of bytes all have about the same.
-    pub fn pick(self, inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    pub fn pick(self, inputs: &[PathBuf], sources: &Sources) -> Result<Vec<PathBuf>> {
         if inputs.len() < self.of as usize {
             return Err(Error::Usage(format!(
                 "--subset {self}: expected as many subsets as there are inputs at most, found {}",
                 inputs.len()
             )));
         }
-        let bytes = |input: &PathBuf| std::fs::metadata(input).map_or(0, |facts| facts.len());
-        let sizes: Vec<u64> = inputs.iter().map(bytes).collect();
+        let sizes: Vec<u64> = inputs.iter().map(|input| sources.bytes(input)).collect();
         Ok(inputs[self.picked(&sizes)].to_vec())
     }
 

@@ -47,7 +47,7 @@ pub use file_name::is_plain_file_name;
 pub use glb_read::read_glb;
 pub use glb_write::{NodeLabel, write_glb, write_glb_encoded};
 pub use node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
-pub use output_dir::{OutputDir, check_apart};
+pub use output_dir::{OutputDir, Unfinished, check_apart};
 pub use quantized::fits_in_steps;
 pub use scene::{BlockInfo, Children, Node, Scene, SharedTexture};
 pub use scene_check::{Element, SceneDefect};

@@ -9,6 +9,7 @@ use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Component, Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::{
     BOXES_DIR, NODES_DIR, REPORT_FILE, SCENE_FILE, SCENE_MAGIC, SUBSETS_DIR, TEXTURES_DIR,
@@ -34,6 +35,8 @@ pub struct OutputDir {
     /// Holds the lock on `partial`.
     lock: Option<File>,
     committed: bool,
+    /// What is in it stays where it is not committed.
+    kept: AtomicBool,
 }
 
 impl OutputDir {
@@ -57,7 +60,10 @@ impl OutputDir {
         let made_partial = make_partial(parent, name)
             .map_err(|error| cannot(parent, "be written into, and the output goes there", &error));
         match made_partial {
-            Ok((partial, lock)) => Ok(Self { target, partial, made, lock, committed: false }),
+            Ok((partial, lock)) => {
+                let kept = AtomicBool::new(false);
+                Ok(Self { target, partial, made, lock, committed: false, kept })
+            }
             Err(error) => {
                 made.iter().for_each(|folder| drop(fs::remove_dir(folder)));
                 Err(error)
@@ -83,6 +89,21 @@ impl OutputDir {
         let mut file = in_folder(&path, || File::create_new(&path))
             .map_err(|error| self.failed(relative, &error))?;
         file.write_all(bytes).map_err(|error| self.failed(relative, &error))
+    }
+
+    /// Writes a file of which there may be an older one, which is there until the new one is whole.
+    pub fn write_over(&self, relative: impl AsRef<Path>, bytes: &[u8]) -> Result<()> {
+        let relative = relative.as_ref();
+        let path = self.place(relative)?;
+        let beside = path.with_extension("new");
+        let write = || fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, &path));
+        write().map_err(|error| self.failed(relative, &error))
+    }
+
+    /// From now on what is written stays, also where there is no [`commit`](Self::commit), until another build
+    /// [goes on](Unfinished) from it, or begins anew.
+    pub fn keep(&self) {
+        self.kept.store(true, Ordering::Relaxed);
     }
 
     /// Takes over a file of an earlier result unchanged: by a hard link, or a copy where the
@@ -160,11 +181,48 @@ impl OutputDir {
 
 impl Drop for OutputDir {
     fn drop(&mut self) {
-        if !self.committed {
+        if !self.committed && !self.kept.load(Ordering::Relaxed) {
             drop(fs::remove_dir_all(&self.partial));
             self.made.iter().for_each(|folder| drop(fs::remove_dir(folder)));
         }
         drop(self.lock.take());
+    }
+}
+
+/// An output that was [kept](OutputDir::keep) by a build that was stopped. While it is held, no other build
+/// sweeps it away.
+#[derive(Debug)]
+pub struct Unfinished {
+    dir: PathBuf,
+    _lock: File,
+}
+
+impl Unfinished {
+    /// Of the output at `path`, the one in which most is finished.
+    pub fn find(path: &Path) -> Option<Self> {
+        let target = resolve(path).ok()?;
+        let stem = hidden(target.file_name()?, PARTIAL);
+        let entries = fs::read_dir(target.parent()?).ok()?.flatten().filter_map(|entry| {
+            let is_partial =
+                entry.file_name().as_encoded_bytes().starts_with(stem.as_encoded_bytes());
+            let dir = entry.path();
+            let scene = fs::metadata(dir.join(SCENE_FILE)).ok().filter(|_| is_partial)?;
+            Some((scene.len(), dir))
+        });
+        let mut found: Vec<(u64, PathBuf)> = entries.collect();
+        found.sort();
+        let held = |(_, dir): (u64, PathBuf)| lock(&dir).map(|lock| Self { dir, _lock: lock });
+        found.into_iter().rev().find_map(held)
+    }
+
+    /// Where what is finished is.
+    pub fn path(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Removes it.
+    pub fn remove(self) {
+        drop(fs::remove_dir_all(&self.dir));
     }
 }
 

@@ -24,7 +24,11 @@ pub fn bounds(path: &Path) -> Result<[[f64; 3]; 2]> {
 /// Of no vertex.
 const NONE: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
 
-fn joined([low, high]: [[f64; 3]; 2], [other_low, other_high]: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
+/// The box around two boxes.
+pub(super) fn joined(
+    [low, high]: [[f64; 3]; 2],
+    [other_low, other_high]: [[f64; 3]; 2],
+) -> [[f64; 3]; 2] {
     [
         std::array::from_fn(|axis| low[axis].min(other_low[axis])),
         std::array::from_fn(|axis| high[axis].max(other_high[axis])),
@@ -32,8 +36,20 @@ fn joined([low, high]: [[f64; 3]; 2], [other_low, other_high]: [[f64; 3]; 2]) ->
 }
 
 fn obj_bounds(path: &Path) -> Result<[[f64; 3]; 2]> {
+    let add = |all, vertex| joined(all, [vertex; 2]);
+    fold_vertices(path, || NONE, add, joined)
+}
+
+/// Goes through the vertices of an OBJ, also those that no triangle has, on several threads: from `first` on
+/// by `add`, and what comes of it by `join`, whose order must not matter.
+pub(super) fn fold_vertices<T: Send>(
+    path: &Path,
+    first: impl Fn() -> T + Sync + Send,
+    add: impl Fn(T, [f64; 3]) -> T + Sync,
+    join: impl Fn(T, T) -> T + Sync + Send,
+) -> Result<T> {
     let mut chunks = Chunks::new(Vec::new(), super::open(path)?, CHUNK_BYTES);
-    let mut all = NONE;
+    let mut all = first();
     loop {
         let mut texts: Vec<Vec<u8>> = Vec::new();
         while texts.len() < 2 * rayon::current_num_threads() {
@@ -46,12 +62,13 @@ fn obj_bounds(path: &Path) -> Result<[[f64; 3]; 2]> {
         if texts.is_empty() {
             return Ok(all);
         }
-        all = joined(all, texts.par_iter().map(|text| of_text(text)).reduce(|| NONE, joined));
+        let of_texts = texts.par_iter().fold(&first, |all, text| vertices(text).fold(all, &add));
+        all = join(all, of_texts.reduce(&first, &join));
     }
 }
 
 /// Of whole statements. Those that cannot be read are [`load`](super::load)'s business.
-fn of_text(text: &[u8]) -> [[f64; 3]; 2] {
+fn vertices(text: &[u8]) -> impl Iterator<Item = [f64; 3]> {
     let starts = std::iter::once(0).chain(memchr::memchr_iter(b'\n', text).map(|end| end + 1));
     let vertex = |start: usize| {
         let line = text.get(start..)?;
@@ -66,7 +83,7 @@ fn of_text(text: &[u8]) -> [[f64; 3]; 2] {
         let [x, y, z] = vertex.map(number);
         Some([x?, y?, z?]).filter(|vertex| vertex.iter().all(|at| at.is_finite()))
     };
-    starts.filter_map(vertex).fold(NONE, |all, vertex| joined(all, [vertex; 2]))
+    starts.filter_map(vertex)
 }
 
 #[cfg(test)]
@@ -78,7 +95,8 @@ mod tests {
         let text =
             b"v 1 2 3\nvt 9 9\nvn -7 -7 -7\n  v\t-1 5 2 0.5 0.5 0.5\nv 4 \\\n0 7\n# v 99 99 99\n\
             v nan 50 50\nv x y z\nf 1 2 3\no v 80 80 80\nv 0 0";
-        assert_eq!(of_text(text), [[-1.0, 0.0, 2.0], [4.0, 5.0, 7.0]]);
-        assert_eq!(of_text(b""), NONE);
+        let of = |text| vertices(text).fold(NONE, |all, vertex| joined(all, [vertex; 2]));
+        assert_eq!(of(text), [[-1.0, 0.0, 2.0], [4.0, 5.0, 7.0]]);
+        assert_eq!(of(b""), NONE);
     }
 }

@@ -20,6 +20,7 @@ mod page_uses;
 mod paged;
 mod paths;
 mod textures;
+pub mod tiling;
 mod tokens;
 mod vertices;
 

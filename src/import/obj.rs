@@ -14,7 +14,7 @@
 
 pub(super) mod chunks;
 mod corners;
-mod statements;
+pub(super) mod statements;
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -25,7 +25,7 @@ use rustc_hash::FxHashMap;
 
 use self::chunks::Chunks;
 use self::corners::{Run, Triangles};
-use self::statements::{Change, Statements, WHITE, first_missing};
+use self::statements::{Change, MOST_VERTICES, Statements, WHITE};
 use super::clean::{CleanStats, clean};
 use super::lines::not_text;
 use super::mtl::{Library, MtlMaterial};
@@ -42,17 +42,23 @@ use crate::{Error, Result};
 const HEAD_BYTES: u64 = 1 << 20;
 
 /// Text that one thread parses at a time: it and what is made of it should stay in the cache.
-const CHUNK_BYTES: usize = 1 << 18;
+pub(super) const CHUNK_BYTES: usize = 1 << 18;
 
 /// Chunks of a batch for each thread: enough to keep all busy when some take longer.
 const CHUNKS_PER_THREAD: usize = 4;
 
-/// Most vertices of a file, so that every index fits 32 bits with room for markers.
-const MOST_VERTICES: usize = u32::MAX as usize - 64;
-
 /// Reads the OBJ at `path` with its material libraries.
 pub(super) fn load(path: &Path, cpu_time: &CpuTime) -> Result<Model> {
     read(path, super::open(path)?, CHUNK_BYTES, cpu_time)
+}
+
+/// Reads a part of the OBJ at `path`, whose text `reader` has.
+pub(super) fn load_part(
+    path: &Path,
+    reader: impl Read + Send,
+    cpu_time: &CpuTime,
+) -> Result<Model> {
+    read(path, reader, CHUNK_BYTES, cpu_time)
 }
 
 /// Reads an OBJ from `reader`; what it names is looked for beside `path`.
@@ -63,16 +69,9 @@ fn read(
     cpu_time: &CpuTime,
 ) -> Result<Model> {
     let unreadable = |error| Error::input(path, format!("cannot be read: {error}"));
-    let mut head = Vec::new();
-    (&mut reader).take(HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
-    if head.is_empty() {
-        return Err(Error::input(path, "is empty; expected a Wavefront OBJ with faces"));
-    }
-    if let Some(what) = not_text(&head) {
-        return Err(Error::input(path, what));
-    }
-    if head.starts_with(b"\xef\xbb\xbf") {
-        head.drain(..3);
+    let mut head = text_of(path, &mut reader)?;
+    if head.starts_with(BYTE_ORDER_MARK) {
+        head.drain(..BYTE_ORDER_MARK.len());
     }
     let mut chunks = Chunks::new(head, reader, chunk_bytes);
     let mut obj = Obj::new(path);
@@ -93,22 +92,39 @@ fn read(
     }
 }
 
+/// What some editors begin a text with.
+pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// The beginning of a file that is text.
+pub(super) fn text_of(path: &Path, reader: &mut impl Read) -> Result<Vec<u8>> {
+    let unreadable = |error| Error::input(path, format!("cannot be read: {error}"));
+    let mut head = Vec::new();
+    reader.take(HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
+    if head.is_empty() {
+        return Err(Error::input(path, "is empty; expected a Wavefront OBJ with faces"));
+    }
+    match not_text(&head) {
+        Some(what) => Err(Error::input(path, what)),
+        None => Ok(head),
+    }
+}
+
 /// A chunk's text, and what it says.
-struct Parsed {
-    text: Vec<u8>,
-    statements: Statements,
+pub(super) struct Parsed {
+    pub(super) text: Vec<u8>,
+    pub(super) statements: Statements,
 }
 
 /// Chunks that are parsed at the same time.
-struct Batch {
+pub(super) struct Batch {
     /// None at the end of the file.
-    parsed: Vec<Parsed>,
+    pub(super) parsed: Vec<Parsed>,
     /// Why reading ended behind them, where it failed.
-    ended: std::io::Result<()>,
+    pub(super) ended: std::io::Result<()>,
 }
 
 impl Batch {
-    fn parse(chunks: &mut Chunks<impl Read>, cpu_time: &CpuTime) -> Self {
+    pub(super) fn parse(chunks: &mut Chunks<impl Read>, cpu_time: &CpuTime) -> Self {
         let mut texts = Vec::new();
         let ended = cpu_time.time(|| {
             while texts.len() < CHUNKS_PER_THREAD * rayon::current_num_threads() {
@@ -233,19 +249,7 @@ impl<'a> Obj<'a> {
     /// Settles what a chunk's indices mean and to which parts its faces belong.
     fn place(&mut self, Parsed { text, statements: mut chunk }: Parsed) -> Result<Placed, String> {
         let before = [self.positions.len(), self.texcoords.len()];
-        let at_line = |(line, what): (u64, String)| format!("line {}: {what}", self.lines + line);
-        if (0..2).any(|kind| chunk.needed[kind] > before[kind] as i64) {
-            let missing = first_missing(&text, before);
-            return Err(missing.map_or_else(|| "an index is out of range".to_owned(), at_line));
-        }
-        if let Some(problem) = chunk.problem.take() {
-            return Err(at_line(problem));
-        }
-        if before[0] + chunk.positions.len() > MOST_VERTICES
-            || before[1] + chunk.texcoords.len() > MOST_VERTICES
-        {
-            return Err(format!("more than {MOST_VERTICES} vertices; divide the file"));
-        }
+        chunk.check(&text, before, self.lines)?;
         self.lines += chunk.lines;
         self.stats.add(&chunk.stats);
         if self.colors.len() > 0 || !chunk.colors.is_empty() {

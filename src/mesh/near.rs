@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::mesh::{PositionKey, key, wide};
+use crate::mesh::{key, wide};
 
 /// Vertices of two inputs no farther apart than this may be one, metres: what is lost where coordinates are
 /// written to millimetres, each tile with an origin of its own.
@@ -14,30 +14,38 @@ pub struct NearVertices {
     positions: Vec<[f64; 3]>,
     /// Of each, the length of its shortest edge.
     shortest: Vec<f64>,
-    /// Numbers of the vertices in each cube of a side of `distance`.
-    in_cube: FxHashMap<[i64; 3], Vec<u32>>,
+    /// Numbers of the vertices, those in one cube of a side of `distance` together.
+    by_cube: Vec<u32>,
+    /// From where to where there those in each cube are.
+    cubes: FxHashMap<[i64; 3], [u32; 2]>,
     distance: f64,
 }
 
 impl NearVertices {
     /// To be looked for within `distance`.
     pub fn new(edges: impl Iterator<Item = [[f64; 3]; 2]>, distance: f64) -> Self {
-        let mut shortest: FxHashMap<PositionKey<f64>, ([f64; 3], f64)> = FxHashMap::default();
-        for ends in edges {
+        let of_edge = |ends: [[f64; 3]; 2]| {
             let length = wide(ends[0]).distance(wide(ends[1]));
-            for end in ends {
-                let (_, least) = shortest.entry(key(end)).or_insert((end, length));
-                *least = least.min(length);
+            ends.map(|end| (end, length))
+        };
+        let mut all: Vec<([f64; 3], f64)> = edges.flat_map(of_edge).collect();
+        all.sort_by_key(|(end, _)| key(*end));
+        all.dedup_by(|next, first| {
+            let is_same = key(next.0) == key(first.0);
+            if is_same {
+                first.1 = first.1.min(next.1);
             }
+            is_same
+        });
+        let (positions, shortest): (Vec<[f64; 3]>, Vec<f64>) = all.into_iter().unzip();
+        let in_cube = |number: &u32| cube(positions[*number as usize], distance);
+        let mut by_cube: Vec<u32> = (0..positions.len() as u32).collect();
+        by_cube.sort_by_cached_key(in_cube);
+        let mut cubes: FxHashMap<[i64; 3], [u32; 2]> = FxHashMap::default();
+        for (at, number) in (0..).zip(&by_cube) {
+            cubes.entry(in_cube(number)).or_insert([at; 2])[1] = at + 1;
         }
-        let mut all: Vec<_> = shortest.into_iter().collect();
-        all.sort_unstable_by_key(|(key, _)| *key);
-        let mut in_cube: FxHashMap<[i64; 3], Vec<u32>> = FxHashMap::default();
-        for (number, (_, (position, _))) in (0..).zip(&all) {
-            in_cube.entry(cube(*position, distance)).or_default().push(number);
-        }
-        let (positions, shortest) = all.into_iter().map(|(_, vertex)| vertex).unzip();
-        Self { positions, shortest, in_cube, distance }
+        Self { positions, shortest, by_cube, cubes, distance }
     }
 
     /// All of them, in order.
@@ -73,7 +81,8 @@ impl NearVertices {
         let cubes = around(x)
             .into_iter()
             .flat_map(|x| around(y).into_iter().flat_map(move |y| around(z).map(|z| [x, y, z])));
-        let numbers = cubes.filter_map(|cube| self.in_cube.get(&cube)).flatten();
+        let ranges = cubes.filter_map(|cube| self.cubes.get(&cube));
+        let numbers = ranges.flat_map(|&[from, to]| &self.by_cube[from as usize..to as usize]);
         let near = numbers.filter_map(|&number| {
             let distance = wide(self.positions[number as usize]).distance(wide(position));
             (distance <= self.reach(number) && may_be(number)).then_some((distance, number))

@@ -16,6 +16,7 @@ mod groups;
 mod houses;
 mod incremental;
 mod left_out;
+mod memory;
 mod output;
 mod paths;
 mod quantize;

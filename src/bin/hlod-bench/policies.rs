@@ -12,7 +12,8 @@ use hlod::runtime::residency::ResidencyOptions;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::print;
-use super::run_args::{Bytes, Switch, parse_size};
+use super::run_args::{Switch, parse_size};
+use hlod::bytes::Bytes;
 
 /// Noise of a frame's time and stalls, where no constants are given: those of a desktop machine
 /// that does other things too.

@@ -1,12 +1,11 @@
 //! What can be asked of a run.
 
-use std::fmt;
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use hlod::Result;
 use hlod::bench::{BenchOptions, Pace, PolicyChoice, Size};
+use hlod::bytes::Bytes;
 use hlod::engine::FarFieldMode;
 use hlod::engine::policies::{POLICIES, Settings};
 use hlod::render::content::TextureFormat;
@@ -155,42 +154,6 @@ pub enum ShadingArg {
     Photo,
     HeadLight,
     Unlit,
-}
-
-/// A number of bytes, with or without KiB, MiB or GiB.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Bytes(pub u64);
-
-impl fmt::Display for Bytes {
-    /// In the largest unit of which it is a whole number.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let units = [("GiB", 30), ("MiB", 20), ("KiB", 10)];
-        match units.iter().find(|(_, shift)| self.0 > 0 && self.0.is_multiple_of(1 << shift)) {
-            Some((unit, shift)) => write!(f, "{}{unit}", self.0 >> shift),
-            None => write!(f, "{}", self.0),
-        }
-    }
-}
-
-impl FromStr for Bytes {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let units =
-            [("KiB", 10), ("MiB", 20), ("GiB", 30), ("K", 10), ("M", 20), ("G", 30), ("B", 0)];
-        let (number, shift) = units
-            .iter()
-            .find_map(|&(unit, shift)| text.strip_suffix(unit).map(|number| (number, shift)))
-            .unwrap_or((text, 0));
-        let wanted = "expected bytes such as 1048576, 512MiB or 1.5GiB";
-        let number: f64 = number.trim().parse().map_err(|_| wanted.to_owned())?;
-        let bytes = number * f64::from(1u32 << shift);
-        if bytes.is_finite() && (0.0..=1e18).contains(&bytes) {
-            Ok(Self(bytes as u64))
-        } else {
-            Err(wanted.to_owned())
-        }
-    }
 }
 
 fn parse_not_negative(text: &str) -> std::result::Result<f64, String> {

@@ -10,6 +10,7 @@ use hlod::builder::progress::Progress;
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::builder::threads::with_threads;
 use hlod::builder::{BuildOptions, Outcome, Subset, build, build_subset, merge_subsets};
+use hlod::bytes::Bytes;
 use hlod::mesh::UpAxis;
 use hlod::place::{Place, Placement};
 use hlod::report::build_summary;
@@ -116,6 +117,15 @@ pub struct BuildArgs {
     /// Threads, 0-1024; 0 is one for each core. The result does not depend on it
     #[arg(long, short = 'j', value_name = "N", default_value_t = 0, help_heading = "Running")]
     threads: usize,
+    /// Keep to so many bytes of memory, 128MiB or more: OBJ files of more than 16 MiB are divided into tiles on
+    /// disk, beside the output and half as large again as the files while it lasts, and built one tile at a
+    /// time. The result is the same for any number, and nearly that without
+    #[arg(long, value_name = "BYTES", help_heading = "Running")]
+    max_memory: Option<Bytes>,
+    /// Go on from what a build with --resume that was stopped had finished, and leave what is finished beside
+    /// the output where this one is stopped. A build without it removes what is left
+    #[arg(long, conflicts_with = "force", help_heading = "Running")]
+    resume: bool,
     /// Build even where nothing has changed
     #[arg(long, help_heading = "Running")]
     force: bool,
@@ -222,6 +232,8 @@ impl BuildArgs {
             max_atlas: self.max_atlas,
             quantize: self.quantize,
             compress: self.compress == CompressArg::Meshopt,
+            max_memory: self.max_memory.map(|Bytes(bytes)| bytes),
+            resume: self.resume,
             force: self.force,
             ..Default::default()
         }
@@ -344,6 +356,11 @@ impl Progress for Bar {
         } else {
             name.into()
         });
+    }
+
+    fn dividing(&self, input: &Path) {
+        let name = input.file_name().unwrap_or_default().to_string_lossy();
+        self.bar.set_message(format!("{name}: dividing"));
     }
 
     fn comparing(&self, input: &Path) {

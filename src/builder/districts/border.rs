@@ -51,22 +51,58 @@ impl PlaneEdges {
     }
 }
 
+/// What the borders of a district depend on: its surface where it ends, and where others are.
+#[derive(Clone, Debug)]
+pub struct Rim {
+    bounds: Bounds,
+    /// Vertices that others may have, too.
+    positions: Vec<[f64; 3]>,
+    /// Edges at which it ends: those in planes of cuts, and where others may be.
+    open: Vec<[[f64; 3]; 2]>,
+    /// Corners of the triangles at the ends of those in planes.
+    triangles: Vec<[[f64; 3]; 3]>,
+}
+
+impl Rim {
+    /// Of a district whose members are this surface; no other is out of the boxes of `others`. `cuts` are the
+    /// planes that divided their blocks.
+    pub fn new(mesh: &Mesh<f64>, cuts: &Cuts, others: &[Bounds]) -> Self {
+        let is_in = |at: &[f64; 3], bounds: &Bounds| {
+            (0..3).all(|axis| bounds.0[axis] <= at[axis] && at[axis] <= bounds.1[axis])
+        };
+        let is_of_others = |at: &&[f64; 3]| others.iter().any(|bounds| is_in(at, bounds));
+        let is_in_plane = |ends: &[[f64; 3]; 2]| {
+            cuts.of(ends).next().is_some() || cuts.along(ends).next().is_some()
+        };
+        let mut open = open_edges(mesh, cuts);
+        open.retain(|ends| is_in_plane(ends) || ends.iter().all(|end| is_of_others(&end)));
+        let in_planes = open.iter().filter(|ends| is_in_plane(ends)).flatten();
+        let ends: FxHashSet<PositionKey<f64>> = in_planes.map(|end| key(*end)).collect();
+        let corners = mesh.triangles.iter();
+        let corners = corners.map(|corners| corners.map(|at| mesh.positions[at as usize]));
+        let is_at_end = |corners: &[[f64; 3]; 3]| corners.iter().any(|at| ends.contains(&key(*at)));
+        Self {
+            bounds: bounds_of(mesh.positions.iter().copied()),
+            positions: mesh.positions.iter().filter(is_of_others).copied().collect(),
+            triangles: corners.filter(is_at_end).collect(),
+            open,
+        }
+    }
+}
+
 impl LevelBorder {
-    /// Between the members of so many districts, of which `rule` says what is kept. `cuts` are the
-    /// planes that divided their blocks: axes and coordinates.
-    pub fn between(districts: &[&Mesh<f64>], cuts: &[(usize, f64)], rule: &KeepRule) -> Self {
-        let bounds: Vec<Bounds> =
-            districts.iter().map(|mesh| bounds_of(mesh.positions.iter().copied())).collect();
+    /// Between districts of which these are the rims, of which `rule` says what is kept. `cuts` are the
+    /// planes that divided their blocks.
+    pub fn between(districts: &[Rim], cuts: &Cuts, rule: &KeepRule) -> Self {
+        let bounds: Vec<Bounds> = districts.iter().map(|rim| rim.bounds).collect();
         let positions = |district: usize| districts[district].positions.iter().copied();
         let shared = shared_positions(&bounds, positions);
         if shared.is_empty() {
             return Self::default();
         }
-        let cuts = Cuts::new(cuts);
-        let open: Vec<Vec<[[f64; 3]; 2]>> =
-            districts.iter().map(|mesh| open_edges(mesh, &cuts)).collect();
+        let open = || districts.iter().flat_map(|rim| &rim.open);
         let is_shared = |ends: &[[f64; 3]; 2]| ends.iter().all(|end| shared.contains(&key(*end)));
-        let common = || open.iter().flatten().filter(|ends| is_shared(ends));
+        let common = || open().filter(|ends| is_shared(ends));
         let mut edges_in: BTreeMap<PlaneKey, usize> = BTreeMap::new();
         for plane in common().flat_map(|ends| cuts.along(ends)) {
             *edges_in.entry(plane).or_default() += 1;
@@ -84,7 +120,7 @@ impl LevelBorder {
         // Also those of one side alone, where the other closed up.
         let mut seen: FxHashSet<EdgeKey> = FxHashSet::default();
         let mut kept: FxHashSet<PositionKey<f64>> = FxHashSet::default();
-        for ends in open.iter().flatten() {
+        for ends in open() {
             if !seen.insert(edge_key(*ends)) {
                 continue;
             }
@@ -216,18 +252,15 @@ fn lids(mesh: &Mesh<f64>, cuts: &Cuts) -> Vec<bool> {
 
 /// The surfaces around vertices, on all sides.
 fn surfaces(
-    districts: &[&Mesh<f64>],
+    districts: &[Rim],
     vertices: &FxHashMap<PositionKey<f64>, u32>,
 ) -> FxHashMap<PositionKey<f64>, SurfaceQuadric> {
     let mut surfaces: FxHashMap<PositionKey<f64>, SurfaceQuadric> =
         vertices.keys().map(|&vertex| (vertex, SurfaceQuadric::default())).collect();
-    for mesh in districts {
-        for triangle in &mesh.triangles {
-            let corners = triangle.map(|vertex| mesh.positions[vertex as usize]);
-            for corner in corners {
-                if let Some(surface) = surfaces.get_mut(&key(corner)) {
-                    surface.add_triangle(corners.map(wide));
-                }
+    for corners in districts.iter().flat_map(|rim| &rim.triangles) {
+        for corner in corners {
+            if let Some(surface) = surfaces.get_mut(&key(*corner)) {
+                surface.add_triangle(corners.map(wide));
             }
         }
     }
@@ -280,6 +313,14 @@ mod tests {
         }
     }
 
+    /// Between districts that may be anywhere.
+    fn between(meshes: &[&Mesh<f64>]) -> LevelBorder {
+        let cuts = Cuts::new(&CUTS);
+        let anywhere = ([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
+        let rims: Vec<Rim> = meshes.iter().map(|mesh| Rim::new(mesh, &cuts, &[anywhere])).collect();
+        LevelBorder::between(&rims, &cuts, &rule())
+    }
+
     fn chunk(mesh: &Mesh<f64>, borders: &LevelBorder) -> Chunk<f64> {
         let mut chunk = Chunk { mesh: mesh.clone(), ..Chunk::default() };
         borders.mark(&mut chunk);
@@ -305,7 +346,7 @@ mod tests {
                 position[0] += 0.25;
             }
         }
-        let borders = LevelBorder::between(&meshes.each_ref(), &CUTS, &rule());
+        let borders = between(&meshes.each_ref());
         let chunks = meshes.each_ref().map(|mesh| chunk(mesh, &borders));
         let all = chunks.each_ref().map(states);
         let count = |of: BorderVertexState| all[0].values().filter(|&&state| state == of).count();
@@ -343,7 +384,7 @@ mod tests {
             mesh
         };
         let meshes = [[0.0, 0.0], [(ACROSS - 1) as f64, 0.0]].map(slanted);
-        let borders = LevelBorder::between(&meshes.each_ref(), &CUTS, &rule());
+        let borders = between(&meshes.each_ref());
         assert!(borders.planes.is_empty());
         assert_eq!(borders.kept.len(), ACROSS);
         let states = states(&chunk(&meshes[0], &borders));
@@ -373,7 +414,7 @@ mod tests {
         };
         let border = |lid, walls| {
             let meshes = [half(8.0, lid, walls), half(24.0, false, true)];
-            let borders = LevelBorder::between(&meshes.each_ref(), &CUTS, &rule());
+            let borders = between(&meshes.each_ref());
             let [chunk, other] = meshes.each_ref().map(|mesh| chunk(mesh, &borders));
             assert_eq!(chunk.border.keep[..5], other.border.keep[..5], "{lid} {walls}");
             borders
@@ -392,7 +433,7 @@ mod tests {
     #[test]
     fn one_district_alone_has_no_border() {
         let mesh = field([0.0, 0.0], hills);
-        let borders = LevelBorder::between(&[&mesh], &CUTS, &rule());
+        let borders = between(&[&mesh]);
         assert!(chunk(&mesh, &borders).path.is_empty());
     }
 
@@ -402,7 +443,7 @@ mod tests {
         let across = (ACROSS - 1) as f64;
         let meshes =
             [[0.0, 0.0], [across, 0.0]].map(|low| field(low, |_, y| (y as i64 % 2) as f64));
-        let borders = LevelBorder::between(&meshes.each_ref(), &CUTS, &rule());
+        let borders = between(&meshes.each_ref());
         let chunk = chunk(&meshes[0], &borders);
         let lattice = Lattice { step: 1.0 / 1024.0 };
         let (chunk, _) = localise(chunk, [0.0; 3], lattice, false);

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -14,13 +15,14 @@ use crate::{Error, Result};
 
 /// What stood in the files of some nodes.
 pub struct Members {
-    /// Their surfaces. Textures are those of the nodes.
+    /// Their surfaces. Textures are those of the nodes, without their pictures.
     pub model: Model,
     /// Their skirts, in source coordinates: convex, of three or four corners.
     pub skirts: Vec<Vec<DVec3>>,
 }
 
-/// Reads nodes of the folder `out`, with all positions on a lattice.
+/// Reads nodes of the folder `out`, with all positions on a lattice. Pictures that stand in their files are
+/// [read](read_pictures) when they are needed: of all districts of a level, surfaces are in memory together.
 pub fn read<'a>(
     out: &Path,
     records: impl Iterator<Item = &'a NodeRecord>,
@@ -48,6 +50,37 @@ pub fn read<'a>(
     Ok(Members { model: reader.model, skirts: reader.skirts })
 }
 
+/// Reads the pictures that stand in the files of the nodes that a model was [`read`] from.
+pub fn read_pictures<'a>(
+    out: &Path,
+    records: impl Iterator<Item = &'a NodeRecord>,
+    model: &mut Model,
+) -> Result<()> {
+    for record in records.filter(|record| !record.pictures.is_empty()) {
+        for (number, image) in read_node(out, record)?.images.into_iter().enumerate() {
+            let NodeImageData::Embedded { bytes, .. } = image.data else { continue };
+            let name = name_of(&record.file, number);
+            let texture = model.textures.iter_mut().find(|texture| texture.name == name);
+            if let Some(texture) = texture {
+                texture.data = TextureData::Embedded(bytes.into());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn read_node(out: &Path, record: &NodeRecord) -> Result<NodeMesh> {
+    let path = out.join(NODES_DIR).join(&record.file);
+    let bytes = std::fs::read(&path)
+        .map_err(|error| Error::output(&path, format!("cannot be read again: {error}")))?;
+    read_glb(&bytes, &path)
+}
+
+/// What a picture of a node's file is called in the model.
+fn name_of(file: &str, number: usize) -> String {
+    format!("{file} {number}")
+}
+
 struct Reader<'a> {
     out: &'a Path,
     lattice: Lattice,
@@ -59,10 +92,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn add(&mut self, record: &NodeRecord) -> Result<()> {
-        let path = self.out.join(NODES_DIR).join(&record.file);
-        let bytes = std::fs::read(&path)
-            .map_err(|error| Error::output(&path, format!("cannot be read again: {error}")))?;
-        let NodeMesh { origin, images, primitives } = read_glb(&bytes, &path)?;
+        let NodeMesh { origin, images, primitives } = read_node(self.out, record)?;
         let textures: Vec<u32> = images
             .into_iter()
             .enumerate()
@@ -106,8 +136,8 @@ impl Reader<'_> {
     fn texture(&mut self, data: NodeImageData, file: &str, number: usize) -> u32 {
         let next = self.model.textures.len() as u32;
         let (name, data) = match data {
-            NodeImageData::Embedded { bytes, .. } => {
-                (format!("{file} {number}"), TextureData::Embedded(bytes.into()))
+            NodeImageData::Embedded { .. } => {
+                (name_of(file, number), TextureData::Embedded(Arc::from([])))
             }
             NodeImageData::Shared { file_name } => {
                 let known = self.shared.entry(file_name.to_string()).or_insert(next);

@@ -22,17 +22,18 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use self::border::LevelBorder;
+use self::border::{LevelBorder, Rim};
+use self::cuts::Cuts;
 use self::detail::{FileDetail, Files};
 use self::grouping::{Item, groups};
 use self::members::Members;
-use self::near::join_near;
+use self::near::Joined;
 use crate::Result;
 use crate::builder::block_setup::{BlockPlace, BlockSetup, Looks, Target};
 use crate::builder::blocks::gather::{gather, localise};
 use crate::builder::blocks::merge_untextured::merge_untextured;
 use crate::builder::border::chain::KeepRule;
-use crate::builder::border::shared::bounds_of;
+use crate::builder::border::shared::{Bounds, bounds_of};
 use crate::builder::cut::split::Chunk;
 use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::emit::shared_textures::write_textures;
@@ -46,7 +47,7 @@ use crate::builder::stitch::stitches;
 use crate::builder::threads::in_parallel;
 use crate::format::{OutputDir, SharedTexture};
 use crate::lattice::Lattice;
-use crate::mesh::{Coordinate, Model, UpAxis, Warnings};
+use crate::mesh::{Coordinate, Model, NEAR, UpAxis, Warnings};
 use crate::report::build_report::{BlockCut, DistrictReport};
 use crate::texture::{SharedTextures, TextureCache};
 
@@ -101,7 +102,7 @@ pub fn build_districts(
 ) -> Result<Districts> {
     let &Above { options, out, stages, progress, earlier, up, cuts, meet } = above;
     let mut districts = Districts::default();
-    for _ in 0..MOST_LEVELS {
+    for number in 0..MOST_LEVELS {
         if trees.len() <= MOST_ROOTS {
             break;
         }
@@ -109,7 +110,8 @@ pub fn build_districts(
         let shared = SharedTextures::new();
         let target = Target { options, out, shared: &shared, stages, progress };
         let reused;
-        (trees, reused) = Level { up, cuts, meet, target, earlier }.build(trees, &mut districts)?;
+        (trees, reused) =
+            Level { up, cuts, meet, target, earlier, number }.build(trees, &mut districts)?;
         if let Some(earlier) = earlier {
             earlier.link_textures(reused.keys(), out)?;
         }
@@ -133,11 +135,12 @@ struct Level<'a> {
     meet: bool,
     target: Target<'a>,
     earlier: Option<&'a Earlier>,
+    /// From 0 upward.
+    number: usize,
 }
 
-/// A district about to be made.
-struct Draft {
-    members: Vec<Tree<NodeRecord>>,
+/// What a district is made of.
+struct Surface {
     model: Model,
     looks: Looks,
     skirts: Vec<Vec<DVec3>>,
@@ -164,24 +167,63 @@ impl Level<'_> {
         let items: Vec<Item> = trees.iter().map(|tree| item(&tree.record)).collect();
         let found = groups(&items, triangles, hierarchy.level_factor as usize);
         let lattice = self.lattice(&items, &found);
+        let boxes: Vec<Bounds> = found.iter().map(|group| around(&items, group, lattice)).collect();
         let mut trees: Vec<Option<Tree<NodeRecord>>> = trees.into_iter().map(Some).collect();
         let taken = |group: Vec<usize>| -> Vec<Tree<NodeRecord>> {
             group.into_iter().filter_map(|member| trees[member].take()).collect()
         };
         let taken: Vec<_> = found.into_iter().map(taken).collect();
         let cuts = self.cuts.iter().map(|cut| (cut.axis, lattice.round(cut.coordinate)));
-        let mut cuts: Vec<(usize, f64)> = cuts.collect();
-        let mut read = in_parallel(taken, |_, members| self.read(members, lattice))?;
-        if self.meet {
-            let mut members: Vec<&mut Members> = read.iter_mut().map(|(_, read)| read).collect();
-            cuts = self.target.stages.time(Stage::Gather, || join_near(&mut members, &cuts));
-        }
-        let drafts = in_parallel(read, |_, read| Ok(self.draft(read)))?;
+        let cuts: Vec<(usize, f64)> = cuts.collect();
+        // Members are read each time that they are needed: those of all districts of a large city would be much
+        // to hold.
+        let read = |members: &[Tree<NodeRecord>], joined: Option<&Joined>| -> Result<Members> {
+            let mut read = self.read(members, lattice)?;
+            if let Some(joined) = joined {
+                self.target.stages.time(Stage::Gather, || joined.apply(&mut read));
+            }
+            Ok(read)
+        };
+        let several = taken.len() > 1;
+        let joined = match self.meet && several {
+            true => {
+                let joined = Joined::of_cuts(&cuts);
+                let ends = in_parallel(taken.iter().collect(), |_, members: &Vec<_>| {
+                    let read = read(members, Some(&joined))?;
+                    Ok(self.target.stages.time(Stage::Gather, || Joined::ends(&read)))
+                })?;
+                Some(self.target.stages.time(Stage::Gather, || joined.with_ends(&ends)))
+            }
+            false => None,
+        };
+        let cuts = Cuts::new(joined.as_ref().map_or(&cuts, |joined| joined.cuts()));
         let rule = self.keep_rule(lattice);
-        let meshes: Vec<_> = drafts.iter().map(|draft| &draft.chunk.mesh).collect();
-        let between = || LevelBorder::between(&meshes, &cuts, &rule);
-        let borders = self.target.stages.time(Stage::Gather, between);
-        let made = in_parallel(drafts, |_, draft| self.district(draft, &borders, lattice))?;
+        let borders = match several {
+            true => {
+                let rims = in_parallel(taken.iter().collect(), |district, members: &Vec<_>| {
+                    let Surface { chunk, .. } = self.surface(read(members, joined.as_ref())?);
+                    let others = boxes.iter().enumerate().filter(|(other, _)| *other != district);
+                    let others: Vec<Bounds> = others
+                        .filter(|(_, other)| meet(&boxes[district], other))
+                        .map(|(_, at)| *at)
+                        .collect();
+                    let rim = || Rim::new(&chunk.mesh, &cuts, &others);
+                    Ok(self.target.stages.time(Stage::Gather, rim))
+                })?;
+                let between = || LevelBorder::between(&rims, &cuts, &rule);
+                self.target.stages.time(Stage::Gather, between)
+            }
+            false => LevelBorder::default(),
+        };
+        let make = |members: Vec<Tree<NodeRecord>>| {
+            let surface = self.surface(read(&members, joined.as_ref())?);
+            self.district(members, surface, &borders, lattice)
+        };
+        // The higher, the more of what is below has to be read to know how far one is off.
+        let made: Vec<Made> = match self.target.options.max_memory {
+            Some(_) if self.number > 0 => taken.into_iter().map(make).collect::<Result<_>>()?,
+            _ => in_parallel(taken, |_, members| make(members))?,
+        };
         let mut next = Vec::with_capacity(made.len());
         let mut reused = BTreeMap::new();
         for Made { trees, report, reused_textures, warnings } in made {
@@ -226,22 +268,17 @@ impl Level<'_> {
         }
     }
 
-    fn read(
-        &self,
-        trees: Vec<Tree<NodeRecord>>,
-        lattice: Lattice,
-    ) -> Result<(Vec<Tree<NodeRecord>>, Members)> {
+    fn read(&self, members: &[Tree<NodeRecord>], lattice: Lattice) -> Result<Members> {
         let Target { out, stages, .. } = self.target;
-        let records = trees.iter().map(|tree| &tree.record);
-        let members = stages.time(Stage::Gather, || members::read(out.path(), records, lattice))?;
-        Ok((trees, members))
+        let records = members.iter().map(|tree| &tree.record);
+        stages.time(Stage::Gather, || members::read(out.path(), records, lattice))
     }
 
-    fn draft(&self, (members, read): (Vec<Tree<NodeRecord>>, Members)) -> Draft {
+    fn surface(&self, members: Members) -> Surface {
         let Target { options, stages, .. } = self.target;
         let hierarchy = &options.hierarchy;
         stages.time(Stage::Gather, || {
-            let Members { mut model, skirts } = read;
+            let Members { mut model, skirts } = members;
             merge_untextured(&mut model);
             // What thinned on both sides of a border of members, but not alike, had skirts.
             let looks = Looks::new(&model, hierarchy.seams);
@@ -249,13 +286,19 @@ impl Level<'_> {
             let between = stitches(&model.parts, kinds, &hierarchy.constants.stitch);
             let chunk = gather(&model.materials, &model.parts, &between);
             // They are in the chunk now.
-            model.parts.iter_mut().for_each(|part| part.positions = Vec::new());
-            Draft { members, model, looks, skirts, chunk }
+            model.parts = Vec::new();
+            Surface { model, looks, skirts, chunk }
         })
     }
 
-    fn district(&self, draft: Draft, borders: &LevelBorder, lattice: Lattice) -> Result<Made> {
-        let Draft { members, model, looks, skirts, mut chunk } = draft;
+    fn district(
+        &self,
+        members: Vec<Tree<NodeRecord>>,
+        surface: Surface,
+        borders: &LevelBorder,
+        lattice: Lattice,
+    ) -> Result<Made> {
+        let Surface { mut model, looks, skirts, mut chunk } = surface;
         let Target { options, out, stages, .. } = self.target;
         stages.time(Stage::Gather, || borders.mark(&mut chunk));
         let prefix = prefix(&members);
@@ -270,6 +313,8 @@ impl Level<'_> {
             let trees = vec![Tree { record, children: members }];
             return Ok(Made { trees, report: Some(report), reused_textures, warnings });
         }
+        let records = members.iter().map(|tree| &tree.record);
+        stages.time(Stage::Gather, || members::read_pictures(out.path(), records, &mut model))?;
         let Looks { textures, extrudable, .. } = looks;
         let cache = TextureCache::new(&model, &textures, [chunk.mesh.materials.iter().copied()]);
         let setup = BlockSetup::new(self.target, self.up, &cache, &extrudable);
@@ -316,6 +361,19 @@ impl Level<'_> {
             }
         })
     }
+}
+
+/// A box around what the files of some nodes have, wherever it is moved to.
+fn around(items: &[Item], group: &[usize], lattice: Lattice) -> Bounds {
+    let corners = group.iter().flat_map(|&member| [items[member].low, items[member].high]);
+    let (low, high) = bounds_of(corners);
+    let reach = 2.0 * (NEAR + lattice.step);
+    (low.map(|at| at - reach), high.map(|at| at + reach))
+}
+
+/// Whether two boxes have a place in common.
+fn meet(one: &Bounds, other: &Bounds) -> bool {
+    (0..3).all(|axis| one.0[axis] <= other.1[axis] && other.0[axis] <= one.1[axis])
 }
 
 fn sort(trees: &mut [Tree<NodeRecord>]) {

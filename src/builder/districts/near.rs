@@ -3,7 +3,6 @@
 //! Blocks keep such vertices where each input has them. A district is one surface, and it is off the source by more
 //! than what the vertices are apart, which is measured with the rest.
 
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::members::Members;
@@ -11,28 +10,53 @@ use crate::builder::stitch::open_edges;
 use crate::builder::tiles::meeting::WRITTEN;
 use crate::mesh::{NEAR, NearVertices, Part, PositionKey, all_differ, key};
 
-/// Joins what members of districts have where inputs meet: planes of `cuts` that are nearly one, and
-/// vertices at which members end, which go to others that may be the same, of each few to the first in order.
-/// Returns the planes that there are then.
-pub fn join_near(members: &mut [&mut Members], cuts: &[(usize, f64)]) -> Vec<(usize, f64)> {
-    let joined_cuts = JoinedCuts::new(cuts);
-    if joined_cuts.any() {
-        members.par_iter_mut().for_each(|members| {
-            let parts = members.model.parts.iter_mut().flat_map(|part| &mut part.positions);
-            parts.for_each(|position| joined_cuts.apply(position));
-            members.skirts.iter_mut().flatten().for_each(|corner| {
+/// What members of districts have where inputs meet and is nearly one, and where it goes: planes of cuts to one
+/// of them, and vertices at which members end to others that may be the same, of each few to the first in
+/// order.
+pub struct Joined {
+    cuts: JoinedCuts,
+    moved: FxHashMap<PositionKey<f64>, [f64; 3]>,
+}
+
+impl Joined {
+    /// Of the planes alone, which divided blocks.
+    pub fn of_cuts(cuts: &[(usize, f64)]) -> Self {
+        Self { cuts: JoinedCuts::new(cuts), moved: FxHashMap::default() }
+    }
+
+    /// Edges at which the members of a district end.
+    pub fn ends(members: &Members) -> Vec<[[f64; 3]; 2]> {
+        open_edges(&members.model.parts).into_iter().map(|edge| edge.ends).collect()
+    }
+
+    /// With the vertices, by the [ends](Self::ends) of all districts, to which the planes were
+    /// [applied](Self::apply).
+    pub fn with_ends(self, ends: &[Vec<[[f64; 3]; 2]>]) -> Self {
+        let moved = joined(&NearVertices::new(ends.iter().flatten().copied(), NEAR));
+        Self { moved, ..self }
+    }
+
+    /// The planes that there are.
+    pub fn cuts(&self) -> &[(usize, f64)] {
+        &self.cuts.cuts
+    }
+
+    /// Moves what is to be moved of the members of a district.
+    pub fn apply(&self, members: &mut Members) {
+        let Members { model, skirts } = members;
+        if self.cuts.any() {
+            let positions = model.parts.iter_mut().flat_map(|part| &mut part.positions);
+            positions.for_each(|position| self.cuts.apply(position));
+            skirts.iter_mut().flatten().for_each(|corner| {
                 let mut at = corner.to_array();
-                joined_cuts.apply(&mut at);
+                self.cuts.apply(&mut at);
                 *corner = at.into();
             });
-        });
+        }
+        if !self.moved.is_empty() {
+            model.parts.iter_mut().for_each(|part| move_vertices(part, &self.moved));
+        }
     }
-    let open: Vec<_> = members.par_iter().map(|members| open_edges(&members.model.parts)).collect();
-    let edges = open.iter().flatten().map(|edge| edge.ends);
-    let moved = joined(&NearVertices::new(edges, NEAR));
-    let parts = members.par_iter_mut().flat_map(|members| &mut members.model.parts);
-    parts.for_each(|part| move_vertices(part, &moved));
-    joined_cuts.cuts
 }
 
 /// Cuts of which none is nearly another.
@@ -130,8 +154,11 @@ mod tests {
         let skirts = vec![vec![DVec3::new(1.002, 0.5, 0.0), DVec3::new(1.002, 0.6, 0.5)]];
         let mut members = squares.clone().map(|model| Members { model, skirts: skirts.clone() });
         let cuts = [(0, 1.0), (1, 1.0), (0, 1.002), (0, 7.0)];
-        let joined = join_near(&mut members.iter_mut().collect::<Vec<_>>(), &cuts);
-        assert_eq!(joined, [(0, 1.0), (0, 7.0), (1, 1.0)]);
+        let joined = Joined::of_cuts(&cuts);
+        members.iter_mut().for_each(|members| joined.apply(members));
+        let joined = joined.with_ends(&members.each_ref().map(Joined::ends));
+        members.iter_mut().for_each(|members| joined.apply(members));
+        assert_eq!(joined.cuts(), [(0, 1.0), (0, 7.0), (1, 1.0)]);
         let at = |model: usize, vertex: usize| members[model].model.parts[0].positions[vertex];
         assert_eq!([at(1, 0)[0], at(1, 3)[0]], [1.0; 2], "in the plane that stayed");
         assert_eq!([at(1, 0), at(1, 3)], [at(0, 1), at(0, 2)]);

@@ -24,6 +24,10 @@ const COARSE: f64 = 0.3;
 /// This share of the bound is much to be off by where it is not known what makes a bound so large.
 const MUCH: f64 = 0.1;
 
+/// Triangles of parts, from which on none is looked at in more detail: what decides may be anywhere in a large
+/// city, and memory and time to find it would grow with that. What parts are off is in the bound then.
+const MOST_TRIANGLES: usize = 100_000;
+
 /// A surface, how far it is off the source, and what there is of it in more detail.
 pub trait Detail: Sized {
     /// Of part of the source, and none of it twice.
@@ -117,18 +121,23 @@ pub fn error_through<D: Detail>(
     }
 }
 
-/// Replaces parts by what there is of them in more detail; whether there was any.
+/// Replaces parts by what there is of them in more detail, as far as that is not too much; whether there was any.
 fn refine<D: Detail>(parts: &mut Vec<Part<D>>, open: &[bool]) -> Result<bool> {
     let mut any = false;
+    let triangles = |part: &Part<D>| part.surface.triangle_count();
+    let mut all_triangles: usize = parts.iter().map(triangles).sum();
     let mut all = Vec::with_capacity(parts.len());
     for (part, &open) in std::mem::take(parts).into_iter().zip(open) {
-        let is_off = part.off.bound > 0.0;
+        let is_off = part.off.bound > 0.0 && all_triangles < MOST_TRIANGLES;
         let finer = if open && is_off { part.detail.finer()? } else { Vec::new() };
         if finer.is_empty() {
             all.push(part);
         } else {
             any = true;
+            let before = all.len();
+            all_triangles -= triangles(&part);
             all.extend(finer.into_iter().filter_map(Part::new));
+            all_triangles += all[before..].iter().map(triangles).sum::<usize>();
         }
     }
     *parts = all;

@@ -64,7 +64,7 @@ pub struct Forest<R> {
 }
 
 /// A node's record and its children.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Tree<R> {
     /// Of the node itself.
     pub record: R,

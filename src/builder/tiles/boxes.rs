@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::rim::BoundingBox;
 use crate::builder::inputs::text_of;
+use crate::builder::sources::Sources;
 use crate::format::BOXES_DIR;
 use crate::{Result, import};
 
@@ -17,13 +18,15 @@ use crate::{Result, import};
 pub fn boxes(
     inputs: &[PathBuf],
     known: &[Option<BoundingBox>],
+    sources: &Sources,
     subsets: Option<&Path>,
     first: usize,
 ) -> Result<Vec<BoundingBox>> {
     let dir = subsets.map(|subsets| subsets.join(BOXES_DIR));
     let mut order: Vec<usize> = (0..inputs.len()).collect();
     order.rotate_left(first);
-    let found = |&at: &usize| (at, known[at].map_or_else(|| find(&inputs[at], dir.as_deref()), Ok));
+    let known = |at: usize| known[at].or_else(|| sources.bounds(&inputs[at]));
+    let found = |&at: &usize| (at, known(at).map_or_else(|| find(&inputs[at], dir.as_deref()), Ok));
     // Not in few large pieces: others are at work on the same.
     let mut all: Vec<(usize, Result<BoundingBox>)> =
         order.par_iter().with_max_len(1).map(found).collect();
@@ -75,19 +78,34 @@ mod tests {
         }
         let inputs = [at("a.obj"), at("b.obj")];
         let of = |x: f64| [[0.0; 3], [x, 1.0, 1.0]];
-        let subsets = at("subsets");
-        assert_eq!(boxes(&inputs, &[None; 2], Some(&subsets), 1).unwrap(), [of(1.0), of(5.0)]);
+        let (subsets, files) = (at("subsets"), Sources::default());
+        assert_eq!(
+            boxes(&inputs, &[None; 2], &files, Some(&subsets), 1).unwrap(),
+            [of(1.0), of(5.0)]
+        );
         let dir = subsets.join(BOXES_DIR);
         assert_eq!(fs::read_dir(&dir).unwrap().count(), 2);
         // Of the same input another's word is taken; of one that has changed since it is not.
         let file = dir.join(name(&inputs[0]).unwrap());
         fs::write(&file, serde_json::to_vec(&of(2.0)).unwrap()).unwrap();
-        assert_eq!(boxes(&inputs, &[None; 2], Some(&subsets), 0).unwrap(), [of(2.0), of(5.0)]);
+        assert_eq!(
+            boxes(&inputs, &[None; 2], &files, Some(&subsets), 0).unwrap(),
+            [of(2.0), of(5.0)]
+        );
         fs::write(&inputs[0], "v 33 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n").unwrap();
-        assert_eq!(boxes(&inputs, &[None; 2], Some(&subsets), 0).unwrap(), [of(33.0), of(5.0)]);
-        assert_eq!(boxes(&inputs, &[Some(of(7.0)), None], None, 0).unwrap(), [of(7.0), of(5.0)]);
+        assert_eq!(
+            boxes(&inputs, &[None; 2], &files, Some(&subsets), 0).unwrap(),
+            [of(33.0), of(5.0)]
+        );
+        assert_eq!(
+            boxes(&inputs, &[Some(of(7.0)), None], &files, None, 0).unwrap(),
+            [of(7.0), of(5.0)]
+        );
         // A damaged file is no word.
         fs::write(dir.join(name(&inputs[1]).unwrap()), "[").unwrap();
-        assert_eq!(boxes(&inputs, &[None; 2], Some(&subsets), 0).unwrap(), [of(33.0), of(5.0)]);
+        assert_eq!(
+            boxes(&inputs, &[None; 2], &files, Some(&subsets), 0).unwrap(),
+            [of(33.0), of(5.0)]
+        );
     }
 }

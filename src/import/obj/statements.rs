@@ -11,7 +11,10 @@ use crate::color::{srgb_to_linear, unorm16};
 /// Most corners of a face: beyond this the ear clipping's own indices could overflow.
 const MOST_CORNERS: usize = 1 << 20;
 
-pub(super) const WHITE: [u16; 4] = [u16::MAX; 4];
+/// Most vertices of a file, so that every index fits 32 bits with room for markers.
+pub(in crate::import) const MOST_VERTICES: usize = u32::MAX as usize - 64;
+
+pub(in crate::import) const WHITE: [u16; 4] = [u16::MAX; 4];
 
 /// Added to indices that are relative to the chunk's beginning; there are fewer elements.
 const RELATIVE: i64 = 1 << 40;
@@ -20,12 +23,12 @@ const ABSENT: i64 = i64::MIN;
 
 /// A corner's index, from 0.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reference(i64);
+pub(in crate::import) struct Reference(i64);
 
 impl Reference {
     /// The element that is meant, where so many come before the chunk; `None` where none is.
     #[inline]
-    pub(super) fn resolve(self, before: usize) -> Option<u32> {
+    pub(in crate::import) fn resolve(self, before: usize) -> Option<u32> {
         match self.0 {
             ABSENT => None,
             from_start if from_start < RELATIVE / 2 => Some(from_start as u32),
@@ -36,7 +39,7 @@ impl Reference {
 
 /// A statement that changes what the faces behind it belong to.
 #[derive(Debug)]
-pub(super) enum Change {
+pub(in crate::import) enum Change {
     Group(String),
     Material(String),
     Libraries(String),
@@ -44,23 +47,23 @@ pub(super) enum Change {
 
 /// A chunk's statements.
 #[derive(Default)]
-pub(super) struct Statements {
-    pub(super) positions: Vec<[f64; 3]>,
+pub(in crate::import) struct Statements {
+    pub(in crate::import) positions: Vec<[f64; 3]>,
     /// Empty until a vertex of the chunk has a colour, then one per position.
-    pub(super) colors: Vec<[u16; 4]>,
-    pub(super) texcoords: Vec<[f64; 2]>,
+    pub(in crate::import) colors: Vec<[u16; 4]>,
+    pub(in crate::import) texcoords: Vec<[f64; 2]>,
     /// Position and texture coordinate of all faces' corners.
-    pub(super) corners: Vec<[Reference; 2]>,
+    pub(in crate::import) corners: Vec<[Reference; 2]>,
     /// How many corners each face has, at least 3.
-    pub(super) faces: Vec<u32>,
+    pub(in crate::import) faces: Vec<u32>,
     /// With the number of faces before each.
-    pub(super) changes: Vec<(usize, Change)>,
+    pub(in crate::import) changes: Vec<(usize, Change)>,
     /// How many positions and texture coordinates there must be before the chunk.
-    pub(super) needed: [i64; 2],
-    pub(super) stats: CleanStats,
-    pub(super) lines: u64,
+    pub(in crate::import) needed: [i64; 2],
+    pub(in crate::import) stats: CleanStats,
+    pub(in crate::import) lines: u64,
     /// What cannot be read, and its line from 1; nothing behind it was read.
-    pub(super) problem: Option<(u64, String)>,
+    pub(in crate::import) problem: Option<(u64, String)>,
 }
 
 impl Statements {
@@ -80,6 +83,30 @@ impl Statements {
         }
         result.lines = lines.count();
         result
+    }
+
+    /// Refuses a chunk, of this text, that means what is not there or cannot be read, where so many
+    /// positions and texture coordinates and so many lines come before it.
+    pub(in crate::import) fn check(
+        &mut self,
+        text: &[u8],
+        before: [usize; 2],
+        lines: u64,
+    ) -> Result<(), String> {
+        let at_line = |(line, what): (u64, String)| format!("line {}: {what}", lines + line);
+        if (0..2).any(|kind| self.needed[kind] > before[kind] as i64) {
+            let missing = first_missing(text, before);
+            return Err(missing.map_or_else(|| "an index is out of range".to_owned(), at_line));
+        }
+        if let Some(problem) = self.problem.take() {
+            return Err(at_line(problem));
+        }
+        if before[0] + self.positions.len() > MOST_VERTICES
+            || before[1] + self.texcoords.len() > MOST_VERTICES
+        {
+            return Err(format!("more than {MOST_VERTICES} vertices; divide the file"));
+        }
+        Ok(())
     }
 
     /// Reads the line at the front of `text` where it is one of those that files are full of, and
@@ -264,7 +291,7 @@ fn for_corners(
 
 /// The first corner of a chunk, with its line from 1, that means an element that is not there,
 /// where so many positions and texture coordinates come before the chunk.
-pub(super) fn first_missing(chunk: &[u8], before: [usize; 2]) -> Option<(u64, String)> {
+fn first_missing(chunk: &[u8], before: [usize; 2]) -> Option<(u64, String)> {
     let [mut positions, mut texcoords] = before;
     let mut lines = Lines::new(chunk);
     while let Ok(Some((line, statement))) = lines.next() {
