@@ -57,6 +57,8 @@ pub struct HiddenNodes {
     is_marked: Vec<Cell<bool>>,
     /// Nodes of the frame before that were drawn.
     drawn: Vec<u32>,
+    /// Whether the front to come hides other nodes than that of the frame before.
+    is_another: bool,
     /// Whether it is looked for in this frame.
     is_looked_for: bool,
     since_s: f64,
@@ -81,6 +83,7 @@ impl HiddenNodes {
             now_s: 0.0,
             is_marked: vec![Cell::new(false); nodes],
             drawn: Vec::new(),
+            is_another: false,
             is_looked_for: true,
             since_s: 0.0,
             look_again_s: LOOK_AGAIN_S,
@@ -135,7 +138,7 @@ impl HiddenNodes {
     }
 
     /// Lets a picture in which `hiding` hide others show what another front hides: less than if it
-    /// were drawn anew, in a part of the time. Whether it shows anything else.
+    /// were drawn anew, in a part of the time.
     fn change(
         &self,
         tree: &SceneTree,
@@ -143,11 +146,10 @@ impl HiddenNodes {
         hiding: &mut Vec<u32>,
         front: &[u32],
         view: &View,
-    ) -> bool {
+    ) {
         let marked = |node: u32| &self.is_marked[node as usize];
         front.iter().for_each(|&node| marked(node).set(true));
-        let are_gone = hiding.iter().any(|&node| !marked(node).get());
-        if are_gone {
+        if hiding.iter().any(|&node| !marked(node).get()) {
             picture.remove(|node| !marked(node).get());
             hiding.retain(|&node| marked(node).get());
         }
@@ -159,9 +161,7 @@ impl HiddenNodes {
             .filter(|&node| marked(node).get() && !picture.hides(view, tree.node(node).bbox))
             .collect();
         front.iter().for_each(|&node| marked(node).set(false));
-        let before = hiding.len();
         self.add(picture, hiding, more.into_iter(), MORE_SLABS);
-        are_gone || hiding.len() > before
     }
 
     /// Whether nothing of a node would be seen, or of nodes below it that are within its box.
@@ -200,7 +200,8 @@ impl HiddenNodes {
         for &node in nodes {
             self.seen_s[node as usize].set(f64::NEG_INFINITY);
         }
-        self.is_looked_for |= !nodes.is_empty();
+        self.is_another |= !nodes.is_empty();
+        self.is_looked_for |= self.is_another;
     }
 
     fn is_out(&self, tree: &SceneTree, node: u32, view: &View, picture: &HidingPicture) -> bool {
@@ -243,15 +244,12 @@ impl HiddenNodes {
 
     /// What has to be drawn of a front that was chosen: the same image as all of it.
     pub fn drawn(&mut self, tree: &SceneTree, front: &[u32], view: &View) -> &[u32] {
-        if self.view.is_none() {
+        let marked = |node: u32| &self.is_marked[node as usize];
+        front.iter().for_each(|&node| marked(node).set(true));
+        let all_there = self.hiding.iter().all(|&node| marked(node).get());
+        front.iter().for_each(|&node| marked(node).set(false));
+        if !all_there || std::mem::take(&mut self.is_another) {
             self.look(view, front);
-        } else {
-            let (mut picture, mut hiding) =
-                (std::mem::take(&mut self.picture), std::mem::take(&mut self.hiding));
-            if self.change(tree, &mut picture, &mut hiding, front, view) {
-                self.in_sight.begin_frame(self.nodes.len());
-            }
-            (self.picture, self.hiding) = (picture, hiding);
         }
         self.drawn.clear();
         let mut drawn = std::mem::take(&mut self.drawn);
@@ -308,7 +306,7 @@ mod tests {
         let (tree, mut hidden) = row();
         hidden.begin_frame(&view(), FRAME_S);
         assert!(!hidden.hides(&tree, 1), "nothing is drawn yet");
-        assert_eq!(hidden.drawn(&tree, &[0, 1, 2], &view()), [0]);
+        assert_eq!(hidden.drawn(&tree, &[0, 1, 2], &view()), [0, 1, 2]);
         hidden.begin_frame(&view(), FRAME_S);
         assert!(hidden.hides(&tree, 1) && hidden.hides(&tree, 2) && !hidden.hides(&tree, 0));
         assert_eq!(hidden.drawn(&tree, &[2, 1, 0], &view()), [0]);
