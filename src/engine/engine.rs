@@ -62,9 +62,7 @@ impl Seen<'_> {
             dt_s: self.dt_s,
         }
     }
-}
 
-impl Seen<'_> {
     /// What drawing may be expected to take, far field included.
     fn budget_ms(&self) -> f64 {
         self.steady.budget_ms(self.target_ms, self.least_ms)

@@ -234,10 +234,13 @@ impl HidingPicture {
         }
         let slope = farthest[0] as f32;
         for (row, (&left, &right)) in rows.zip(left.iter().zip(&*right)) {
+            if left > right {
+                continue;
+            }
             // Not by `ceil`, which is a call where a processor may have no instruction for it.
             let from = left as usize;
             let from = from + usize::from((from as f64) < left);
-            if left > right || from as f64 > right {
+            if from as f64 > right {
                 continue;
             }
             let (from, to) = (from as i32, right as i32 + 1);
