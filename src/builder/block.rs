@@ -22,7 +22,7 @@ use crate::builder::hierarchy::{BorderMode, Forest, HierarchyOptions, LeftOut, R
 use crate::builder::options::BuildOptions;
 use crate::builder::simplify::aggregate::BodyRules;
 use crate::builder::stages::{Stage, Stages};
-use crate::builder::stitch::{Stitch, stitches};
+use crate::builder::stitch::{OpenEdge, Stitch, stitches};
 use crate::builder::threads::in_parallel;
 use crate::builder::tiles::border::InputBorder;
 use crate::format::BlockInfo;
@@ -123,7 +123,11 @@ pub fn build_input(
     let HierarchyOptions { desired_tris, constants, .. } = &options.hierarchy;
     let looks = Looks::new(&model, options.hierarchy.seams);
     let kinds = looks.kinds(&model.parts);
-    let stitches = stages.time(Stage::Gather, || stitches(&model.parts, kinds, &constants.stitch));
+    let stitches = stages.time(Stage::Gather, || {
+        let shared = border.positions();
+        let goes_on = |edge: &OpenEdge| edge.ends.iter().all(|end| shared.contains(&key(*end)));
+        stitches(&model.parts, kinds, &constants.stitch, goes_on)
+    });
     let Looks { textures: texture_plan, extrudable, .. } = looks;
     // Where textures are many and small enough to keep a root from being what it should, they are
     // baked anew.

@@ -8,6 +8,7 @@ use super::faithful::rounding;
 use super::node_errors::NodeError;
 use super::options::Limits;
 use super::report::{Check, ErrorFigures};
+use super::step::vertex_bounds;
 use super::tree::line;
 use crate::format::Scene;
 use crate::lattice::Quantization;
@@ -30,6 +31,7 @@ pub(super) fn errors(
         ],
         false => ["name the files that the scene was built from, or build it again"; 2],
     };
+    let bounds = vertex_bounds(scene);
     let mut ratios: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
     let lattice = Quantization::of(&scene.parameters);
     let mut largest: BTreeMap<u32, f64> = BTreeMap::new();
@@ -43,7 +45,8 @@ pub(super) fn errors(
     let mut count_too_small: BTreeMap<u32, u64> = BTreeMap::new();
     for measured in nodes {
         let node = &scene.nodes[measured.node as usize];
-        let rounding = rounding(scene, measured.node, steps[measured.node as usize]);
+        let number = measured.node as usize;
+        let rounding = rounding(scene, measured.node, steps[number], bounds[number]);
         let (stored, max) = (node.geometric_error, measured.max());
         // The lattice of a quantised build moves leaves and nodes alike, and a bound has room for
         // both; it cannot be seen between them.

@@ -12,22 +12,24 @@ use super::report::{Check, LeafFigures};
 use super::sample::area;
 use super::seams::Seam;
 use super::source::Source;
+use super::step::vertex_bounds;
 use crate::format::Scene;
 use crate::lattice::Quantization;
 
-/// How far a point of a leaf may be from the source for rounding, metres: half a step along each
-/// axis for the rounding of source vertices, and as much again for each cut on the way to the
-/// leaf, since a cut rounds the vertices that it makes. Of a coarse node: the bound of the leaves
+/// How far a point of a leaf may be from the source for rounding, metres: the [bound](vertex_bounds) of source
+/// vertices, and half a step along each axis for each cut on the way to the leaf, since a cut rounds
+/// the vertices that it makes. Of a coarse node: the bound of the leaves
 /// on its scene's last level. Where the scene is quantised, errors contain the rounding: then a
 /// leaf's error is its bound, where that is less, a coarse node's has room for skirts alone.
-pub(super) fn rounding(scene: &Scene, node: u32, step: f64) -> f64 {
+pub(super) fn rounding(scene: &Scene, node: u32, step: f64, vertex_bound: f64) -> f64 {
     let factor = scene.parameters["level_factor"].as_u64().unwrap_or(4).clamp(2, 64);
     let cuts_each = factor.next_power_of_two().ilog2();
     let level = match &scene.nodes[node as usize] {
         leaf if leaf.first_child.is_none() => leaf.level,
         _ => scene.level_count().saturating_sub(1) as u32,
     };
-    let bound = step * (0.5 * f64::from(1 + level * cuts_each) + LAST_BITS) * 3f64.sqrt();
+    let of_cuts = step * (0.5 * f64::from(level * cuts_each) + LAST_BITS);
+    let bound = (vertex_bound + of_cuts) * 3f64.sqrt();
     match (Quantization::of(&scene.parameters), &scene.nodes[node as usize]) {
         (None, _) => bound,
         (Some(_), leaf) if leaf.first_child.is_none() => {
@@ -64,17 +66,21 @@ pub(super) fn faithful(
     let mut check = Check::new("faithful leaves");
     let surface = &source.surface;
     let assembly = Assembly::new(leaves.iter().copied(), geometry);
+    let bounds = vertex_bounds(scene);
     let leaf_steps = || leaves.iter().map(|&leaf| steps[leaf as usize]);
+    let leaf_bounds = || leaves.iter().map(|&leaf| bounds[leaf as usize]);
     // Strays lie on a lattice that may be much coarser; all others are looked for first.
     let finest = leaf_steps().fold(f64::INFINITY, f64::min);
     let coarsest = leaf_steps().fold(0.0, f64::max);
+    let vertex_bound = leaf_bounds().fold(f64::INFINITY, f64::min);
+    let most = leaf_bounds().fold(0.0, f64::max);
     let mut figures = LeafFigures {
         source_area: (0..surface.triangles().len() as u32)
             .map(|triangle| area(surface.corners(triangle)))
             .sum(),
         leaf_area: leaves.iter().map(|&leaf| geometry[leaf as usize].area()).sum(),
         source_vertices: surface.positions().len() as u64,
-        vertex_bound: finest * 0.5 * 3f64.sqrt(),
+        vertex_bound: vertex_bound * 3f64.sqrt(),
         ..LeafFigures::default()
     };
     // Where the lattice is known, so is what becomes of the source on it.
@@ -124,11 +130,12 @@ pub(super) fn faithful(
                     && (rounded - point).length() <= lattice.bound() * (1.0 + LAST_BITS)
             });
         }
-        [finest, coarsest].iter().any(|step| {
-            let reach = step * (0.5 + LAST_BITS) * 3f64.sqrt();
+
+        [vertex_bound, most].iter().any(|bound| {
+            let reach = bound * (1.0 + 2.0 * LAST_BITS) * 3f64.sqrt();
             assembly.surface.within(point, reach).iter().any(|hit| {
                 let (leaf, _) = assembly.owner(hit.triangle);
-                let each = steps[leaf as usize] * (0.5 + LAST_BITS);
+                let each = bounds[leaf as usize] + steps[leaf as usize] * LAST_BITS;
                 let corners = assembly.surface.corners(hit.triangle);
                 corners.iter().any(|&corner| (corner - point).abs().max_element() <= each)
             })
@@ -152,7 +159,7 @@ pub(super) fn faithful(
         let point = surface.positions()[vertex];
         check.fail(
             format!("source vertex at {} {} {}", point.x, point.y, point.z),
-            format!("no leaf has it within {:.1e} m along each axis", finest * 0.5),
+            format!("no leaf has it within {vertex_bound:.1e} m along each axis"),
             HINT,
         );
     }
@@ -170,7 +177,7 @@ pub(super) fn faithful(
         .collect();
     for (&leaf, &distance) in leaves.iter().zip(&farthest) {
         figures.farthest = figures.farthest.max(distance);
-        let bound = rounding(scene, leaf, steps[leaf as usize]);
+        let bound = rounding(scene, leaf, steps[leaf as usize], bounds[leaf as usize]);
         if distance > bound {
             check.fail(
                 &scene.nodes[leaf as usize].file,
@@ -188,7 +195,7 @@ pub(super) fn faithful(
         figures.missing_vertices,
         figures.source_vertices,
         figures.thin_vertices,
-        finest * 0.5,
+        vertex_bound,
         figures.farthest,
     );
     (figures, check)

@@ -14,7 +14,7 @@
 //! Two nodes of one level whose borders were thinned alike meet along a line beside the seam; there
 //! their rims are compared too. Where different inputs touch, they meet as blocks of one do; where they
 //! agree to millimetres only, gaps may be as wide as they are apart, and beside districts, which join
-//! them, wider by [`NEAR`]. Where the source has a gap there, it is taken off.
+//! them and what is next to them, wider by [`NEAR`]. Where the source has a gap there, it is taken off.
 
 use std::collections::BTreeMap;
 
@@ -53,6 +53,8 @@ struct SeamCheck<'a> {
     /// Where the source ends, and the leaf that has each edge.
     open: &'a [([DVec3; 2], u32)],
     lines: Lines,
+    /// Whether there are several inputs, of which districts join vertices that are nearly one.
+    several: bool,
     steps: &'a [f64],
     limits: &'a Limits,
 }
@@ -98,7 +100,8 @@ pub(super) fn gaps(
     let mut check = Check::new("gaps");
     progress.phase("gaps", seams.len() as u64);
     let lines = Lines::new(open.iter().map(|&(ends, _)| ends));
-    let checker = SeamCheck { scene, geometry, open, lines, steps, limits };
+    let several = scene.blocks.windows(2).any(|two| two[0].input != two[1].input);
+    let checker = SeamCheck { scene, geometry, open, lines, several, steps, limits };
     let found: Vec<Found> = groups(scene, seams)
         .par_iter()
         .map(|group| {
@@ -201,9 +204,10 @@ impl SeamCheck<'_> {
                 }
                 let level = |node: u32| scene.nodes[node as usize].level;
                 let error = |node: u32| scene.nodes[node as usize].geometric_error;
-                // Where inputs nearly agree, districts join what each of them keeps as it is.
-                let apart = if seam.apart() > 0.0 { seam.apart() + NEAR } else { 0.0 };
-                let tolerance = limits.gap_steps * steps[a as usize].max(steps[b as usize]) + apart;
+                let rounding = limits.gap_steps * steps[a as usize].max(steps[b as usize]);
+                let is_district = |node: u32| scene.nodes[node as usize].block.is_none();
+                let joined = self.several && (is_district(a) || is_district(b));
+                let tolerance = rounding + seam.apart() + if joined { NEAR } else { 0.0 };
                 let same_level = level(a) == level(b);
                 let error = error(a).max(error(b));
                 let levels = [level(a).min(level(b)), level(a).max(level(b))];

@@ -14,18 +14,20 @@ use super::lines::Lines;
 use super::report::{Check, Failure};
 use super::seams::Rims;
 use super::source::Source;
+use super::step::vertex_bounds;
 use crate::format::Scene;
 
 /// Checks all edges of the leaves. `steps` are the nodes' lattice steps.
 pub(super) fn joints(scene: &Scene, source: &Source, rims: &Rims, steps: &[f64]) -> Check {
     let mut check = Check::new("leaves meet");
     let open = rims.open();
+    let bounds = vertex_bounds(scene);
     let of_source = source.open_edges();
     let lines = Lines::new(of_source.iter().copied());
     let torn: Vec<(f64, Failure)> = open
         .par_iter()
         .filter_map(|&(ends, leaf)| {
-            let reach = rounding(scene, leaf, steps[leaf as usize]);
+            let reach = rounding(scene, leaf, steps[leaf as usize], bounds[leaf as usize]);
             if along_one(&lines, ends, reach) {
                 return None;
             }

@@ -18,13 +18,27 @@ use crate::lattice::Quantization;
 /// level have one lattice; all are taken to have that of the largest.
 pub(super) fn steps(scene: &Scene) -> Vec<f64> {
     let quantization = Quantization::of(&scene.parameters);
-    fine_lattices(scene).into_iter().map(|fine| fine.or_coarser(quantization).step).collect()
+    let fine = fine_lattices(scene).into_iter();
+    fine.map(|(fine, _)| fine.or_coarser(quantization).step).collect()
+}
+
+/// For each node how far along each axis a vertex of it may be off the source's, metres: half of its lattice's
+/// step, and where that is coarser than the lattice of its input among several, on which vertices were before,
+/// half of that one's.
+pub(super) fn vertex_bounds(scene: &Scene) -> Vec<f64> {
+    let quantization = Quantization::of(&scene.parameters);
+    let bound = |(fine, tile): (Lattice, Option<Lattice>)| {
+        let Lattice { step } = fine.or_coarser(quantization);
+        let before = tile.filter(|tile| tile.step < step).map_or(0.0, |tile| tile.step);
+        0.5 * (step + before)
+    };
+    fine_lattices(scene).into_iter().map(bound).collect()
 }
 
 /// The same without regard to quantisation: how closely nodes meet whatever the lattice is, since
 /// all of them lie on it.
 pub(super) fn fine_steps(scene: &Scene) -> Vec<f64> {
-    fine_lattices(scene).into_iter().map(|fine| fine.step).collect()
+    fine_lattices(scene).into_iter().map(|(fine, _)| fine.step).collect()
 }
 
 /// What a node is of: a block, or where it is of none, the tree below a root.
@@ -34,7 +48,8 @@ enum Block {
     Root(u32),
 }
 
-fn fine_lattices(scene: &Scene) -> Vec<Lattice> {
+/// Of each node, and that of its input where there are several.
+fn fine_lattices(scene: &Scene) -> Vec<(Lattice, Option<Lattice>)> {
     // A block may have several roots.
     let block_of = |number: u32| match scene.nodes[number as usize].block {
         Some(block) => Block::Number(block),
@@ -100,8 +115,9 @@ fn fine_lattices(scene: &Scene) -> Vec<Lattice> {
             let group = group_of(block);
             let [extent, magnitude] = groups.get(&group).copied().unwrap_or_default();
             let fine = Lattice::for_extent(extent * (1.0 + 1e-6), magnitude);
-            let of_tile = tiles.get(group.0).filter(|_| is_several);
-            of_tile.map_or(fine, |of_tile| fine.coarser(Lattice::for_tile(*of_tile)))
+            let of_tile = tiles.get(group.0).filter(|_| is_several).copied();
+            let of_tile = of_tile.map(Lattice::for_tile);
+            (of_tile.map_or(fine, |of_tile| fine.coarser(of_tile)), of_tile)
         })
         .collect()
 }

@@ -18,9 +18,12 @@ const SMALL: [&str; 2] = ["--desired-tris", "250"];
 
 /// A city of nine blocks cut into `n` by `n` files in `tiles`, each moved by what `shift` says.
 fn tiles(n: usize, shift: impl Fn([usize; 2]) -> [f64; 3]) -> TempDir {
+    tiles_of(&CityOptions { blocks: 9, triangles: 30_000, ..small_city() }, n, shift)
+}
+
+fn tiles_of(options: &CityOptions, n: usize, shift: impl Fn([usize; 2]) -> [f64; 3]) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let options = CityOptions { blocks: 9, triangles: 30_000, ..small_city() };
-    let city = hlod::import::load(&write_city(folder.path(), &options)).unwrap();
+    let city = hlod::import::load(&write_city(folder.path(), options)).unwrap();
     cut_into_tiles(&city, n, [0, 1], &folder.path().join("tiles"), shift).unwrap();
     folder
 }
@@ -58,6 +61,28 @@ fn tiles_meet_on_all_levels() {
     run_build(folder.path(), &[&SMALL[..], &["tiles", "out"]].concat());
     let (edges, widest) = between_inputs(&verified(folder.path(), "out", "tiles"));
     assert!(edges > 400 && widest < 1e-3, "{edges} edges, {widest} m");
+}
+
+/// Lines that run in walls leave slivers on either side, which close up where they are thinned.
+#[test]
+fn tiles_cut_along_walls_meet_and_keep_to_their_errors() {
+    let options = CityOptions { blocks: 9, triangles: 60_000, seed: 2, ..small_city() };
+    for n in [2, 5] {
+        let folder = tiles_of(&options, n, in_place);
+        run_build(folder.path(), &["--quiet", "tiles", "out"]);
+        let (edges, widest) = between_inputs(&verified(folder.path(), "out", "tiles"));
+        assert!(edges > 150 && widest < 0.005, "{n}: {edges} edges, {widest} m");
+    }
+}
+
+/// Coordinates of planes are rounded on each level of districts, as those of vertices are.
+#[test]
+fn districts_above_districts_meet_at_planes_between_lattice_points() {
+    let options = CityOptions { blocks: 9, triangles: 320_000, seed: 1, ..small_city() };
+    let folder = tiles_of(&options, 11, in_place);
+    run_build(folder.path(), &["--quiet", "tiles", "out"]);
+    let (edges, widest) = between_inputs(&verified(folder.path(), "out", "tiles"));
+    assert!(edges > 10_000 && widest < 0.005, "{edges} edges, {widest} m");
 }
 
 #[test]

@@ -13,6 +13,9 @@ const MARGIN: f64 = 0.02;
 /// and must not come to lie short of its ends.
 const ROUNDING_STEPS: f64 = 2.0;
 
+/// A polyline that reaches so many times as far as its end comes back: its chord is not along it.
+const TURNED: f64 = 2.0;
+
 /// A polygon over a polyline and its chord.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Cover {
@@ -23,14 +26,14 @@ pub(super) struct Cover {
 }
 
 impl Cover {
-    /// The cover of a polyline in the plane across `axis`; `None` where its ends are one, or it has
-    /// nothing between them.
+    /// The cover of a polyline in the plane across `axis`; `None` where it has nothing between its ends, or all of
+    /// it is in one place.
     pub fn of(points: &[[f32; 3]], axis: usize, rules: &SkirtRules) -> Option<Self> {
         let [first, _, .., last] = points else { return None };
         if points.len() < 3 {
             return None;
         }
-        let frame = Frame::new(wide(*first), wide(*last), axis)?;
+        let frame = Frame::new(wide(*first), direction(points, wide(*last)), axis)?;
         let SkirtRules { step, constants, .. } = rules;
         let rounding = ROUNDING_STEPS * step;
         // Along and across.
@@ -107,6 +110,13 @@ fn triangle(
     let width = right - left;
     let apex = width * slopes[0] * slopes[1] / (slopes[0] + slopes[1]);
     Some([[left, base], [right, base], [left + apex / slopes[0], base + apex]])
+}
+
+/// The end of the chord, or where a polyline comes back to where it began, what is farthest from there.
+fn direction(points: &[[f32; 3]], last: DVec3) -> DVec3 {
+    let from = |at: DVec3| at.distance(wide(points[0]));
+    let farthest = points.iter().map(|&at| wide(at)).max_by(|a, b| from(*a).total_cmp(&from(*b)));
+    farthest.filter(|at| from(*at) > TURNED * from(last)).unwrap_or(last)
 }
 
 /// Coordinates along a chord and across it, in a plane.
@@ -222,9 +232,17 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_covered_between_one_place_or_along_an_edge() {
+    fn polylines_that_come_back_are_covered_along_their_length() {
+        for last in [[0.043, 0.006], [0.0, 0.0]] {
+            let cover = cover(&[[0.0, 0.0], [3.0, 0.001], [7.2, 0.001], last]);
+            assert!(cover.height < 0.02, "{cover:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_covered_along_an_edge_or_in_one_place() {
         assert_eq!(Cover::of(&[[0.0; 3], [0.0, 1.0, 0.0]], 0, &rules()), None);
-        assert_eq!(Cover::of(&[[0.0; 3], [0.0, 1.0, 0.0], [0.0; 3]], 0, &rules()), None);
+        assert_eq!(Cover::of(&[[0.0; 3]; 3], 0, &rules()), None);
         assert_eq!(deviation(&[[0.0; 3], [0.0, 1.0, 0.5], [0.0, 2.0, 0.0]]), 0.5);
     }
 }

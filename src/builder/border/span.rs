@@ -8,6 +8,7 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use crate::builder::border::chain::Chain;
 use crate::builder::border::thin::{EdgeKey, border_edges, edge_key};
 use crate::builder::border::vertex::{Border, Path};
 use crate::mesh::{Mesh, PositionKey, key};
@@ -24,6 +25,23 @@ pub struct BorderSpan {
 }
 
 impl BorderSpan {
+    /// An edge of a chain.
+    pub fn of_edge(plane: u32, chain: usize, edge: usize) -> Self {
+        Self { plane, chain: chain as u32, ends: [edge as u32, edge as u32 + 1] }
+    }
+
+    /// Whether all of it lies in the plane across an axis.
+    pub fn is_in(&self, axis: usize, coordinate: f32, path: &Path) -> bool {
+        self.points(path).iter().all(|at| at[axis] == coordinate)
+    }
+
+    /// A chain of its own.
+    pub fn chain(&self, path: &Path) -> Chain {
+        let Chain { keep, .. } = &path.plane(self.plane).chains[self.chain as usize];
+        let keep = keep[self.ends[0] as usize..=self.ends[1] as usize].to_vec();
+        Chain { positions: self.points(path).to_vec(), keep }
+    }
+
     /// The original polyline, ends included.
     pub fn points<'a>(&self, path: &'a Path) -> &'a [[f32; 3]] {
         let chain = &path.plane(self.plane).chains[self.chain as usize];
@@ -146,7 +164,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::builder::border::chain::{Chain, CutPlane};
+    use crate::builder::border::chain::CutPlane;
 
     /// A slit across the plane x = 0: two polylines from one end to the other, with two triangles
     /// behind each edge's ends.

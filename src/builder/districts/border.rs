@@ -31,6 +31,8 @@ pub struct LevelBorder {
     planes: BTreeMap<PlaneKey, Arc<CutPlane<f64>>>,
     /// Vertices that stay.
     kept: FxHashSet<PositionKey<f64>>,
+    /// The vertices of the planes.
+    on_planes: FxHashSet<PositionKey<f64>>,
 }
 
 /// The border vertices of a plane, numbered, and their edges.
@@ -160,7 +162,13 @@ impl LevelBorder {
             .filter(|(_, plane)| !plane.edges.is_empty())
             .map(|(at, plane)| (at, ranked(plane, at)))
             .collect();
-        Self { planes, kept }
+        Self { planes, kept, on_planes: on_planes.into_keys().collect() }
+    }
+
+    /// Whether a place is a vertex that districts have in common, or one of a plane along which they meet.
+    pub fn has(&self, position: [f64; 3]) -> bool {
+        let at = key(position);
+        self.kept.contains(&at) || self.on_planes.contains(&at)
     }
 
     /// Gives a district its part of the borders.

@@ -16,6 +16,7 @@ pub mod detail;
 pub mod grouping;
 pub mod members;
 pub mod near;
+mod polygon;
 pub mod widened;
 
 use std::collections::BTreeMap;
@@ -43,7 +44,7 @@ use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
 use crate::builder::reuse::Earlier;
 use crate::builder::stages::{Stage, Stages};
-use crate::builder::stitch::stitches;
+use crate::builder::stitch::{OpenEdge, stitches};
 use crate::builder::threads::in_parallel;
 use crate::format::{OutputDir, SharedTexture};
 use crate::lattice::Lattice;
@@ -102,6 +103,7 @@ pub fn build_districts(
 ) -> Result<Districts> {
     let &Above { options, out, stages, progress, earlier, up, cuts, meet } = above;
     let mut districts = Districts::default();
+    let mut cuts: Vec<(usize, f64)> = cuts.iter().map(|cut| (cut.axis, cut.coordinate)).collect();
     for number in 0..MOST_LEVELS {
         if trees.len() <= MOST_ROOTS {
             break;
@@ -111,7 +113,7 @@ pub fn build_districts(
         let target = Target { options, out, shared: &shared, stages, progress };
         let reused;
         (trees, reused) =
-            Level { up, cuts, meet, target, earlier, number }.build(trees, &mut districts)?;
+            Level { up, meet, target, earlier, number }.build(trees, &mut cuts, &mut districts)?;
         if let Some(earlier) = earlier {
             earlier.link_textures(reused.keys(), out)?;
         }
@@ -131,7 +133,6 @@ pub fn build_districts(
 /// One level of districts.
 struct Level<'a> {
     up: UpAxis,
-    cuts: &'a [BlockCut],
     meet: bool,
     target: Target<'a>,
     earlier: Option<&'a Earlier>,
@@ -156,9 +157,12 @@ struct Made {
 }
 
 impl Level<'_> {
+    /// Of trees, and the planes that divided what they stand for, as their nodes have them; these are as the
+    /// level's have them afterwards.
     fn build(
         &self,
         mut trees: Vec<Tree<NodeRecord>>,
+        cuts: &mut Vec<(usize, f64)>,
         districts: &mut Districts,
     ) -> Result<(Vec<Tree<NodeRecord>>, BTreeMap<String, SharedTexture>)> {
         sort(&mut trees);
@@ -168,13 +172,17 @@ impl Level<'_> {
         let found = groups(&items, triangles, hierarchy.level_factor as usize);
         let lattice = self.lattice(&items, &found);
         let boxes: Vec<Bounds> = found.iter().map(|group| around(&items, group, lattice)).collect();
+        let others_of = |district: usize| -> Vec<Bounds> {
+            let others = boxes.iter().enumerate().filter(|(other, _)| *other != district);
+            others.filter(|(_, other)| meet(&boxes[district], other)).map(|(_, at)| *at).collect()
+        };
         let mut trees: Vec<Option<Tree<NodeRecord>>> = trees.into_iter().map(Some).collect();
         let taken = |group: Vec<usize>| -> Vec<Tree<NodeRecord>> {
             group.into_iter().filter_map(|member| trees[member].take()).collect()
         };
         let taken: Vec<_> = found.into_iter().map(taken).collect();
-        let cuts = self.cuts.iter().map(|cut| (cut.axis, lattice.round(cut.coordinate)));
-        let cuts: Vec<(usize, f64)> = cuts.collect();
+        // Rounded from level to level, as vertices are.
+        cuts.iter_mut().for_each(|(_, coordinate)| *coordinate = lattice.round(*coordinate));
         // Members are read each time that they are needed: those of all districts of a large city would be much
         // to hold.
         let read = |members: &[Tree<NodeRecord>], joined: Option<&Joined>| -> Result<Members> {
@@ -187,7 +195,7 @@ impl Level<'_> {
         let several = taken.len() > 1;
         let joined = match self.meet && several {
             true => {
-                let joined = Joined::of_cuts(&cuts);
+                let joined = Joined::of_cuts(cuts);
                 let ends = in_parallel(taken.iter().collect(), |_, members: &Vec<_>| {
                     let read = read(members, Some(&joined))?;
                     Ok(self.target.stages.time(Stage::Gather, || Joined::ends(&read)))
@@ -196,18 +204,16 @@ impl Level<'_> {
             }
             false => None,
         };
-        let cuts = Cuts::new(joined.as_ref().map_or(&cuts, |joined| joined.cuts()));
+        if let Some(joined) = &joined {
+            *cuts = joined.cuts().to_vec();
+        }
+        let cuts = Cuts::new(cuts);
         let rule = self.keep_rule(lattice);
         let borders = match several {
             true => {
                 let rims = in_parallel(taken.iter().collect(), |district, members: &Vec<_>| {
-                    let Surface { chunk, .. } = self.surface(read(members, joined.as_ref())?);
-                    let others = boxes.iter().enumerate().filter(|(other, _)| *other != district);
-                    let others: Vec<Bounds> = others
-                        .filter(|(_, other)| meet(&boxes[district], other))
-                        .map(|(_, at)| *at)
-                        .collect();
-                    let rim = || Rim::new(&chunk.mesh, &cuts, &others);
+                    let Surface { chunk, .. } = self.surface(read(members, joined.as_ref())?, None);
+                    let rim = || Rim::new(&chunk.mesh, &cuts, &others_of(district));
                     Ok(self.target.stages.time(Stage::Gather, rim))
                 })?;
                 let between = || LevelBorder::between(&rims, &cuts, &rule);
@@ -215,14 +221,24 @@ impl Level<'_> {
             }
             false => LevelBorder::default(),
         };
-        let make = |members: Vec<Tree<NodeRecord>>| {
-            let surface = self.surface(read(&members, joined.as_ref())?);
+        let make = |district: usize, members: Vec<Tree<NodeRecord>>| {
+            let mut read = read(&members, joined.as_ref())?;
+            // What closes gaps between members is of no use where no other district is.
+            let others = others_of(district);
+            read.skirts.retain(|skirt| {
+                let around = bounds_of(skirt.iter().map(|at| at.to_array()));
+                others.iter().any(|other| meet(&around, other))
+            });
+            let surface = self.surface(read, Some(&borders));
             self.district(members, surface, &borders, lattice)
         };
         // The higher, the more of what is below has to be read to know how far one is off.
         let made: Vec<Made> = match self.target.options.max_memory {
-            Some(_) if self.number > 0 => taken.into_iter().map(make).collect::<Result<_>>()?,
-            _ => in_parallel(taken, |_, members| make(members))?,
+            Some(_) if self.number > 0 => {
+                let made = taken.into_iter().enumerate();
+                made.map(|(district, members)| make(district, members)).collect::<Result<_>>()?
+            }
+            _ => in_parallel(taken, make)?,
         };
         let mut next = Vec::with_capacity(made.len());
         let mut reused = BTreeMap::new();
@@ -274,7 +290,8 @@ impl Level<'_> {
         stages.time(Stage::Gather, || members::read(out.path(), records, lattice))
     }
 
-    fn surface(&self, members: Members) -> Surface {
+    /// Of members; with strips between those that touch where it is known what is a border with other districts.
+    fn surface(&self, members: Members, borders: Option<&LevelBorder>) -> Surface {
         let Target { options, stages, .. } = self.target;
         let hierarchy = &options.hierarchy;
         stages.time(Stage::Gather, || {
@@ -283,7 +300,11 @@ impl Level<'_> {
             // What thinned on both sides of a border of members, but not alike, had skirts.
             let looks = Looks::new(&model, hierarchy.seams);
             let kinds = looks.kinds(&model.parts);
-            let between = stitches(&model.parts, kinds, &hierarchy.constants.stitch);
+            let between = borders.map(|borders| {
+                let goes_on = |edge: &OpenEdge| edge.ends.iter().all(|end| borders.has(*end));
+                stitches(&model.parts, kinds, &hierarchy.constants.stitch, goes_on)
+            });
+            let between = between.unwrap_or_default();
             let chunk = gather(&model.materials, &model.parts, &between);
             // They are in the chunk now.
             model.parts = Vec::new();

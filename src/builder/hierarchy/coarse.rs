@@ -171,11 +171,8 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let mut within_budget = None;
         let mut budget = node.budget as f64;
         let most = budget * self.resolutions.step(node.resolution) * constants.most_triangles;
-        while kept.least() < constants.least_kept {
-            budget *= more_triangles(kept.least(), constants);
-            if budget > most {
-                break;
-            }
+        while kept.least() < constants.least_kept && budget < most {
+            budget = most.min(budget * more_triangles(kept.least(), constants));
             within_budget = within_budget.or(Some(kept));
             (coarse, reason) = simplified(&CoarseNode { budget: budget as usize, ..*node });
             kept = kept_by(&coarse);

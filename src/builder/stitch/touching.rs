@@ -20,17 +20,19 @@ use crate::mesh::{Part, PositionKey, key, wide};
 
 /// The strips between all borders of some parts that touch; `kinds` says for each what it looks
 /// like: the first of those materials that differ in nothing but their images. Only borders of one
-/// kind touch; `None` touches nothing, since its colours may not leave their triangles.
+/// kind touch; `None` touches nothing, since its colours may not leave their triangles. Edges at which
+/// the surface `goes_on` in what is built apart touch nothing either.
 pub fn stitches(
     parts: &[Part],
     kinds: Vec<Option<u32>>,
     constants: &StitchConstants,
+    goes_on: impl Fn(&OpenEdge) -> bool,
 ) -> Vec<Stitch> {
     if constants.resolution <= 0.0 {
         return Vec::new();
     }
     let mut edges = open_edges(parts);
-    edges.retain(|edge| kinds[edge.part as usize].is_some());
+    edges.retain(|edge| kinds[edge.part as usize].is_some() && !goes_on(edge));
     if edges.is_empty() {
         return Vec::new();
     }
@@ -443,7 +445,7 @@ mod tests {
     }
 
     fn between(parts: &[Part]) -> Vec<Stitch> {
-        stitches(parts, vec![Some(0); parts.len()], &StitchConstants::default())
+        stitches(parts, vec![Some(0); parts.len()], &StitchConstants::default(), |_| false)
     }
 
     /// The stitches as a part.
@@ -518,12 +520,18 @@ mod tests {
         assert_eq!(between(&[first.clone(), beside(5.25)]), [], "as wide as a square");
 
         let parts = [first.clone(), beside(5.05)];
-        let of =
-            |kinds: [Option<u32>; 2]| stitches(&parts, kinds.to_vec(), &StitchConstants::default());
+        let of = |kinds: [Option<u32>; 2]| {
+            stitches(&parts, kinds.to_vec(), &StitchConstants::default(), |_| false)
+        };
         assert_eq!(of([Some(0), Some(1)]), []);
         assert_eq!(of([None, None]), []);
         let never = StitchConstants { resolution: 0.0, ..StitchConstants::default() };
-        assert_eq!(stitches(&parts, vec![Some(0); 2], &never), []);
+        assert_eq!(stitches(&parts, vec![Some(0); 2], &never, |_| false), []);
+        // Where both go on in what is built apart.
+        let goes_on = |edge: &OpenEdge| edge.ends.iter().all(|end| end[1] <= 2.5);
+        let some = stitches(&parts, vec![Some(0); 2], &StitchConstants::default(), goes_on);
+        assert!(some.len() > 15 && some.len() < 25, "{}", some.len());
+        assert!(some.iter().all(|stitch| stitch.edge.iter().any(|end| end[1] > 2.5)));
 
         // Two walls back to back, both of which end at the ground.
         let upright = |mut part: Part, x: f64| {

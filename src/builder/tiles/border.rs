@@ -58,6 +58,13 @@ impl InputBorder {
         with_edges.map(|plane| (plane.axis, plane.coordinate))
     }
 
+    /// The vertices that it has in common with others.
+    pub fn positions(&self) -> FxHashSet<PositionKey<f64>> {
+        let chains = self.planes.iter().flat_map(|plane| &plane.chains);
+        let of_planes = chains.flat_map(|chain| &chain.positions).map(|&at| key(at));
+        self.kept.iter().copied().chain(of_planes).collect()
+    }
+
     /// Gives a chunk of the input its part of it.
     pub fn mark(&self, chunk: &mut Chunk<f64>) {
         if !(self.planes.is_empty() && self.kept.is_empty()) {
