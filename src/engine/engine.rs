@@ -107,6 +107,9 @@ pub struct Engine<'a> {
     start_bytes: u64,
 }
 
+/// Of the target, so much is for uploads however long drawing takes: what comes may be what takes less.
+const LEAST_FOR_UPLOADS: f64 = 0.08;
+
 /// Locks; a thread that died while it held the lock is an error of ours.
 pub fn lock(residency: &Mutex<Residency>) -> Result<MutexGuard<'_, Residency>> {
     residency.lock().map_err(|_| Error::Internal("a loading thread died".into()))
@@ -324,7 +327,9 @@ impl<'a> Engine<'a> {
 
     /// Takes over what arrived and lets go of what left.
     fn begin_frame(&mut self, report: &mut FrameReport) -> Result<Changes> {
+        let upload_bytes = self.upload_bytes();
         let mut residency = lock(&self.residency)?;
+        residency.limit_uploads(upload_bytes);
         let changes = residency.begin_frame(self.seen.dt_s);
         for &node in &changes.left {
             self.seen.residents.set(node, false);
@@ -337,6 +342,19 @@ impl<'a> Engine<'a> {
         report.arrived = changes.arrived.len() as u32;
         report.uploaded_bytes = changes.arrived_bytes;
         Ok(changes)
+    }
+
+    /// What there is time to upload beside what the frame before drew. All that there is until the first view is
+    /// in memory.
+    fn upload_bytes(&self) -> u64 {
+        if !self.settling.has_ended() {
+            return u64::MAX;
+        }
+        let target_ms = self.seen.target_ms;
+        let drawing_ms = self.choosing.expected_ms() + self.costs.estimate(&self.load).mean_ms;
+        let left_ms = (target_ms - drawing_ms).max(LEAST_FOR_UPLOADS * target_ms);
+        let of_bytes = |uploaded_bytes| Load { uploaded_bytes, ..Load::default() };
+        (left_ms / self.costs.added_ms(&of_bytes(1e6)) * 1e6) as u64
     }
 
     /// Knows what the nodes in memory hide, and of no others.

@@ -15,6 +15,11 @@ pub(super) struct Settling {
 }
 
 impl Settling {
+    /// Whether it was over after the frame before.
+    pub fn has_ended(&self) -> bool {
+        self.is_over
+    }
+
     /// After a frame, `dt_s` seconds after the one before: how many nodes arrived in it and for how
     /// many it still waits.
     pub fn is_over(&mut self, arrived: u32, waiting: u32, dt_s: f64) -> bool {

@@ -142,22 +142,25 @@ fn farthest(from: &Surface, to: &Surface) -> (f64, DVec3) {
     }
     let mut used = vec![false; from.positions().len()];
     from.triangles().iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
-    let mut measure = |at: DVec3| {
+    let measured = |at: DVec3| {
         let (nearest, distance) =
             to.closest(at).map_or((0, 0.0), |hit| (hit.triangle, hit.distance()));
-        if distance > best.0 {
-            best = (distance, at);
-        }
-        (Corner { at, nearest, distance }, best.0)
+        Corner { at, nearest, distance }
     };
-    let corners: Vec<Corner> = (0..)
-        .zip(from.positions())
-        .map(|(vertex, &at)| match used[vertex as usize] {
-            true => measure(at).0,
-            false => Corner { at, nearest: 0, distance: 0.0 },
+    let corners: Vec<Corner> = (0..from.positions().len())
+        .into_par_iter()
+        .map(|vertex| match (used[vertex], from.positions()[vertex]) {
+            (true, at) => measured(at),
+            (false, at) => Corner { at, nearest: 0, distance: 0.0 },
         })
         .collect();
-    let mut largest = corners.iter().map(|corner| corner.distance).fold(0.0, f64::max);
+    // The first of equals.
+    for corner in &corners {
+        if corner.distance > best.0 {
+            best = (corner.distance, corner.at);
+        }
+    }
+    let mut largest = best.0;
     let part = |corners: [Corner; 3], largest: f64| {
         // Cheap, and mostly enough.
         let [a, b, c] = corners;
@@ -166,18 +169,22 @@ fn farthest(from: &Surface, to: &Surface) -> (f64, DVec3) {
         let part = (!near).then(|| Part::new(corners, to));
         part.filter(|part| part.bound > largest * (1.0 + SLACK))
     };
-    let mut open: BinaryHeap<Part> = from
+    let open: Vec<Part> = from
         .triangles()
-        .iter()
+        .par_iter()
         .filter_map(|triangle| part(triangle.map(|v| corners[v as usize]), largest))
         .collect();
+    let mut open = BinaryHeap::from(open);
     let triangles = from.triangles().len() as f64;
     for _ in 0..LEAST_DIVISIONS + (triangles * DIVISIONS_PER_TRIANGLE) as usize {
         let farther = |part: &Part| part.bound > largest * (1.0 + SLACK);
         let Some(next) = open.pop().filter(farther) else { break };
         let [a, b, c] = from_longest_edge(next.corners);
-        let (middle, most) = measure((a.at + b.at) * 0.5);
-        largest = most;
+        let middle = measured((a.at + b.at) * 0.5);
+        if middle.distance > best.0 {
+            best = (middle.distance, middle.at);
+        }
+        largest = best.0;
         open.extend([[a, middle, c], [middle, b, c]].into_iter().filter_map(|c| part(c, largest)));
     }
     best

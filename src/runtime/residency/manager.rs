@@ -94,6 +94,7 @@ impl Residency {
             frame_s: 0.0,
             missed: Vec::new(),
             upload_bytes: 0,
+            upload_limit: u64::MAX,
             ahead_bytes: 0.0,
             arrivals: Vec::new(),
             leaving: Vec::new(),
@@ -351,6 +352,12 @@ impl Residency {
         self.list.remove(node);
     }
 
+    /// From the next frame on no more bytes than this are uploaded in one, however many
+    /// [the rate](ResidencyOptions::upload_bytes_per_s) allows; one node always comes.
+    pub fn limit_uploads(&mut self, bytes: u64) {
+        self.upload_limit = bytes;
+    }
+
     /// What drawing takes over and lets go of before it draws a frame. After this call arrived
     /// nodes are resident and the memory of those that left is free. `dt_s` is the seconds since the
     /// frame before began.
@@ -385,7 +392,7 @@ impl Residency {
         let mut taken = 0;
         for &node in &self.arrivals {
             bytes += self.sizes.nodes[node as usize].held_bytes;
-            if taken > 0 && bytes > self.upload_bytes && self.frame > 0 {
+            if taken > 0 && bytes > self.upload_bytes.min(self.upload_limit) && self.frame > 0 {
                 break;
             }
             taken += 1;

@@ -106,6 +106,8 @@ pub struct Residency {
     pub(super) missed: Vec<u32>,
     /// Bytes that a frame uploads at most, if it takes as long as the last one did.
     pub(super) upload_bytes: u64,
+    /// Bytes that there is time for beside what is drawn; see [`Residency::limit_uploads`].
+    pub(super) upload_limit: u64,
     /// Bytes of nodes that may be wanted soon that can begin to load now.
     pub(super) ahead_bytes: f64,
     /// Loaded, in the order in which they were.

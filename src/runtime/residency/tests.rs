@@ -338,6 +338,22 @@ fn uploads_of_a_second_are_bounded_but_one_always_comes() {
 }
 
 #[test]
+fn uploads_are_bounded_by_what_there_is_time_for() {
+    let tree = tree(vec![sketch([0.0; 3], 1.0, (0..5).map(|_| leaf()).collect())]);
+    let options = ResidencyOptions { upload_bytes_per_s: 100 * HELD, ..options(1 << 20) };
+    let mut residency = started(&tree, sizes(6), options);
+    let all = [(0, 9.0), (1, 5.0), (2, 4.0), (3, 3.0), (4, 2.0), (5, 1.0)];
+    residency.set_priorities(&all, &[]);
+    load_all(&mut residency);
+    // The rate allows four in 40 ms.
+    let arrived = [2 * HELD, 0, u64::MAX].map(|bytes| {
+        residency.limit_uploads(bytes);
+        residency.begin_frame(0.04).arrived
+    });
+    assert_eq!(arrived, [vec![1, 2], vec![3], vec![4, 5]]);
+}
+
+#[test]
 fn nodes_in_memory_that_nobody_visits_come_up_in_turn() {
     let tree = two_levels();
     let mut residency = started(&tree, sizes(7), options(1 << 20));
