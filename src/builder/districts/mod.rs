@@ -324,7 +324,7 @@ impl Level<'_> {
         stages.time(Stage::Gather, || borders.mark(&mut chunk));
         let prefix = prefix(&members);
         let file = format!("{prefix}.glb");
-        let made_of = made_of(&members, &chunk);
+        let made_of = made_of(&members, &chunk, &skirts);
         let report = DistrictReport { file: file.clone(), made_of };
         let (reused_textures, warnings) = Default::default();
         if let Some(earlier) = self.earlier
@@ -422,7 +422,7 @@ fn prefix(members: &[Tree<NodeRecord>]) -> String {
 }
 
 /// A hash of all that a district is made of.
-fn made_of(members: &[Tree<NodeRecord>], chunk: &Chunk<f64>) -> String {
+fn made_of(members: &[Tree<NodeRecord>], chunk: &Chunk<f64>, skirts: &[Vec<DVec3>]) -> String {
     let mut hasher = blake3::Hasher::new();
     for Tree { record, .. } in members {
         hasher.update(record.file.as_bytes());
@@ -444,6 +444,15 @@ fn made_of(members: &[Tree<NodeRecord>], chunk: &Chunk<f64>) -> String {
     // Vertices may have been joined with those of others.
     for at in chunk.mesh.positions.as_flattened() {
         hasher.update(&at.to_le_bytes());
+    }
+    // Which strips and stitches there are depends on where other districts are.
+    for corner in skirts.iter().flatten() {
+        corner.to_array().iter().for_each(|at| {
+            hasher.update(&at.to_le_bytes());
+        });
+    }
+    for corner in chunk.stitches.as_flattened() {
+        hasher.update(&corner.to_le_bytes());
     }
     hasher.update(&chunk.border.keep);
     for planes in &chunk.border.planes {
