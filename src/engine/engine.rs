@@ -110,6 +110,11 @@ pub struct Engine<'a> {
 /// Of the target, so much is for uploads however long drawing takes: what comes may be what takes less.
 const LEAST_FOR_UPLOADS: f64 = 0.08;
 
+/// What these bytes add to a frame that uploads them.
+fn uploading_ms(costs: &CostModel, uploaded_bytes: f64) -> f64 {
+    costs.added_ms(&Load { uploaded_bytes, ..Load::default() })
+}
+
 /// Locks; a thread that died while it held the lock is an error of ours.
 pub fn lock(residency: &Mutex<Residency>) -> Result<MutexGuard<'_, Residency>> {
     residency.lock().map_err(|_| Error::Internal("a loading thread died".into()))
@@ -353,8 +358,7 @@ impl<'a> Engine<'a> {
         let target_ms = self.seen.target_ms;
         let drawing_ms = self.choosing.expected_ms() + self.costs.estimate(&self.load).mean_ms;
         let left_ms = (target_ms - drawing_ms).max(LEAST_FOR_UPLOADS * target_ms);
-        let of_bytes = |uploaded_bytes| Load { uploaded_bytes, ..Load::default() };
-        (left_ms / self.costs.added_ms(&of_bytes(1e6)) * 1e6) as u64
+        (left_ms / uploading_ms(&self.costs, 1e6) * 1e6) as u64
     }
 
     /// Knows what the nodes in memory hide, and of no others.
@@ -392,7 +396,9 @@ impl<'a> Engine<'a> {
         if self.settling.is_over(report.arrived, report.waiting, dt_s) {
             let expected_ms = choosing_ms + costs.priced_ms(&drawn);
             let frame_ms = steady.frame_ms(target_ms, least_ms);
-            self.margin.observe(expected_ms, report.frame_ms, frame_ms, dt_s);
+            // Uploads take what drawing leaves: they are no reason to draw less.
+            let uploading_ms = uploading_ms(costs, changes.arrived_bytes as f64);
+            self.margin.observe(expected_ms, report.frame_ms - uploading_ms, frame_ms, dt_s);
         }
         costs.observe(&whole, report.frame_ms - report.select_ms, report.gpu_ms, dt_s);
         self.choosing.observe(report.select_ms, dt_s);

@@ -47,11 +47,11 @@ const RANGE: [f64; 2] = [0.5, 2.0];
 
 /// Compares what frames took with what their prices come to.
 ///
-/// Whatever the cost model has no term for counts: noise, choosing, uploads. By the frames of the last
-/// twenty seconds, of those which are expected to take the target over `ratio` 84 of 100 will keep to it,
-/// and 98 will be late by less than a tenth of it. Quantiles rather than
-/// deviations, since times have long tails: a stall of a second would otherwise cost detail for
-/// as long as it is remembered.
+/// Whatever the cost model has no term for counts. What uploads take does not: they are bounded by what
+/// drawing leaves. By the frames of the last twenty seconds, of those which are expected to take the
+/// target over `ratio` 84 of 100 will keep to it, and 98 will be late by less than a tenth of it.
+/// Quantiles rather than deviations, since times have long tails: a stall of a second would otherwise
+/// cost detail for as long as it is remembered.
 #[derive(Clone, Debug, Default)]
 pub struct Margin {
     /// When frames were drawn, and what they took over what was expected.
@@ -84,8 +84,8 @@ impl Margin {
         self.ratios.len() > FEW
     }
 
-    /// A frame of a budget, `dt_s` seconds after the one before, took `actual_ms`. What is no number,
-    /// took no time or far less than the budget is passed over.
+    /// A frame of a budget, `dt_s` seconds after the one before, took `actual_ms` without what it
+    /// uploaded. What is no number, took no time or far less than the budget is passed over.
     pub fn observe(&mut self, expected_ms: f64, actual_ms: f64, budget_ms: f64, dt_s: f64) {
         self.now_s += if dt_s.is_finite() { dt_s.max(0.0) } else { 0.0 };
         let is_old = |at: &(f64, f64)| at.0 < self.now_s - WINDOW_S;

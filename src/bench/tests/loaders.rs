@@ -62,7 +62,7 @@ impl Backend for Loader<'_> {
 
 /// Every front of the run is sound, or it ends with an error.
 fn replay(name: &str, cap: u64, loads: fn(u32) -> bool, is_broken: fn(u32) -> bool) -> Run {
-    let (scene, path) = (street(20), walk(600));
+    let (scene, path) = (street(20, 2), walk(600));
     let tree = SceneTree::new(&scene);
     let options = BenchOptions {
         target_ms: 6.0,
@@ -118,7 +118,7 @@ fn a_loader_that_fails_for_some_nodes_keeps_their_parents_drawn() {
     for kind in POLICIES {
         let run = replay(kind.name, ROOM, |_| true, |node| node % 3 == 0);
         // A node that cannot be used is read once, and then no more.
-        let nodes = street(20).nodes.len() as u64;
+        let nodes = street(20, 2).nodes.len() as u64;
         let read: u64 = run.frames[1..].iter().map(|at| at.report.read_bytes).sum();
         let evicted: u64 = run.frames.iter().map(|at| at.report.evictions).sum();
         assert!(read <= 1000 * (nodes + evicted), "{}: {read} bytes", kind.name);

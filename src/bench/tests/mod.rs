@@ -18,8 +18,8 @@ use crate::runtime::SceneTree;
 use crate::runtime::residency::{Residency, ResidencyOptions, Sizes};
 use crate::runtime::test_tree::{Sketch, scene, sketch};
 
-/// A street of houses along x, each of three levels with two children a node.
-fn street(houses: usize) -> Scene {
+/// A street of houses along x, each of so many levels below its root, with two children a node.
+fn street(houses: usize, levels: u32) -> Scene {
     fn node(at: [f64; 3], size: f64, depth: u32) -> Sketch {
         let children = match depth {
             0 => vec![],
@@ -29,7 +29,7 @@ fn street(houses: usize) -> Scene {
         };
         Sketch { size, benefit: size, error: size / 20.0, ..sketch(at, 100.0, children) }
     }
-    scene((0..houses).map(|house| node([house as f64 * 20.0, 15.0, 0.0], 16.0, 2)).collect())
+    scene((0..houses).map(|house| node([house as f64 * 20.0, 15.0, 0.0], 16.0, levels)).collect())
 }
 
 /// Along the street at 1.5 m/s and 30 frames a second, looking ahead and aside.
@@ -127,7 +127,7 @@ fn context(options: BenchOptions) -> Context {
 
 #[test]
 fn the_same_run_gives_the_same_bytes() {
-    let (scene, path) = (street(20), walk(200));
+    let (scene, path) = (street(20, 2), walk(200));
     let [first, second] = [(); 2].map(|()| {
         let run = replay(&scene, &path, options(1 << 20));
         frames_csv(&run, &context(options(1 << 20))).unwrap()
@@ -138,12 +138,12 @@ fn the_same_run_gives_the_same_bytes() {
 
 #[test]
 fn a_walk_starts_with_the_roots_and_gets_finer_as_nodes_arrive() {
-    let run = replay(&street(20), &walk(300), options(1 << 20));
+    let run = replay(&street(20, 2), &walk(300), options(1 << 20));
     let first = &run.frames[0];
     assert_eq!(first.report.nodes_by_level[1..], [0, 0]);
     assert_eq!(first.report.resident, 20);
     assert_eq!(run.start_bytes, 20 * 200);
-    let nodes = street(20).nodes.len() as u64;
+    let nodes = street(20, 2).nodes.len() as u64;
     assert_eq!(run.scene_bytes, nodes * 200);
     let last = run.frames.last().unwrap();
     assert!(last.report.nodes_by_level[2] > 0, "{last:?}");
@@ -159,8 +159,32 @@ fn a_walk_starts_with_the_roots_and_gets_finer_as_nodes_arrive() {
 }
 
 #[test]
+fn what_uploads_take_costs_no_detail() {
+    // Past houses that come into view one after another, at 30 m/s, looking at them. A node takes a fortieth of
+    // a frame to upload.
+    let mut path = walk(300);
+    for frame in &mut path.frames {
+        frame.pose.position.x *= 20.0;
+        frame.pose.rotation = from_angles(UpAxis::Z, 90.0, 0.0, 0.0);
+    }
+    let scene = street(20, 5);
+    let replay = |upload_ms: f64| {
+        let mut constants = constants();
+        constants.prices.uploaded_byte = upload_ms / 200.0;
+        let policy = PolicyChoice::new("gain-over-price", &Settings::new()).unwrap();
+        let options = BenchOptions { policy, ..options(1 << 20) };
+        let run = replay_by(&scene, &path, options, constants, None);
+        let frames = &run.frames[60..];
+        assert!(frames.iter().all(|frame| frame.report.arrived > 0));
+        frames.iter().map(|frame| f64::from(frame.report.nodes)).sum::<f64>()
+    };
+    let (without, with) = (replay(0.0), replay(0.08));
+    assert!(with > 0.99 * without, "{with} nodes beside {without}");
+}
+
+#[test]
 fn loading_reads_no_faster_than_the_clock_allows() {
-    let run = replay(&street(20), &walk(300), options(1 << 20));
+    let run = replay(&street(20, 2), &walk(300), options(1 << 20));
     let mut seconds = 0.0;
     let mut bytes = 0;
     for frame in &run.frames {
@@ -186,7 +210,7 @@ fn stand(frames: u64) -> CameraPath {
 /// thesis's counters go up and down with its shares.
 #[test]
 fn a_still_camera_comes_to_rest_in_spite_of_noise() {
-    let (scene, path) = (street(60), stand(6000));
+    let (scene, path) = (street(60, 2), stand(6000));
     let constants =
         ClockConstants { noise: 0.045, stalls_per_s: 0.1, stall_ms: 5.0, ..constants() };
     for kind in POLICIES {
@@ -203,7 +227,7 @@ fn a_still_camera_comes_to_rest_in_spite_of_noise() {
 
 #[test]
 fn a_still_camera_settles() {
-    let run = replay(&street(20), &stand(20_000), options(1 << 20));
+    let run = replay(&street(20, 2), &stand(20_000), options(1 << 20));
     let late: u32 = run.frames[10_000..].iter().map(|frame| frame.report.toggles()).sum();
     assert_eq!(late, 0);
 }
@@ -211,7 +235,7 @@ fn a_still_camera_settles() {
 #[test]
 fn memory_stays_below_a_cap_of_a_few_nodes_and_is_used() {
     let cap = 20 * 200 + 6 * 200 + 1000;
-    let run = replay(&street(20), &walk(600), options(cap));
+    let run = replay(&street(20, 2), &walk(600), options(cap));
     assert!(run.peak_bytes <= cap);
     assert!(run.frames.iter().all(|frame| frame.report.memory_bytes <= cap));
     assert!(run.peak_bytes as f64 > 0.9 * cap as f64, "{} of {cap}", run.peak_bytes);
@@ -222,14 +246,14 @@ fn memory_stays_below_a_cap_of_a_few_nodes_and_is_used() {
 fn frames_of_settling_are_not_logged() {
     let mut options = options(1 << 20);
     options.warm_up_frames = 100;
-    let run = replay(&street(20), &walk(10), options);
+    let run = replay(&street(20, 2), &walk(10), options);
     assert_eq!(run.frames.len(), 10);
     assert!(run.frames[0].report.nodes_by_level[1..].iter().sum::<u32>() > 0, "settled before");
 }
 
 #[test]
 fn a_summary_has_the_promised_keys_and_agrees_with_the_frames() {
-    let run = replay(&street(20), &walk(300), options(1 << 20));
+    let run = replay(&street(20, 2), &walk(300), options(1 << 20));
     let context = context(options(1 << 20));
     let summary = summary(&run, &context);
     for key in [
@@ -267,7 +291,7 @@ fn a_summary_has_the_promised_keys_and_agrees_with_the_frames() {
 fn a_run_is_written_whole_and_compares_with_itself_and_not_with_another_target() {
     let dir = tempfile::tempdir().unwrap();
     let write = |name: &str, options: BenchOptions| {
-        let run = replay(&street(20), &walk(100), options.clone());
+        let run = replay(&street(20, 2), &walk(100), options.clone());
         let context = context(options);
         let out = dir.path().join(name);
         let summary = summary(&run, &context);
@@ -318,7 +342,7 @@ impl Policy for Overlapping {
 
 #[test]
 fn a_front_that_is_none_ends_the_run_with_policy_frame_and_rule() {
-    let (scene, path, options) = (street(20), walk(100), options(1 << 20));
+    let (scene, path, options) = (street(20, 2), walk(100), options(1 << 20));
     let tree = SceneTree::new(&scene);
     let sizes = Sizes::new(&scene, |vertices, _, _| u64::from(vertices) * 20, |_| 0);
     let residency = Residency::new(&tree, sizes, options.residency).unwrap();
@@ -361,7 +385,7 @@ impl FrameInspector for Onlooker {
 
 #[test]
 fn a_witness_sees_every_front_and_changes_nothing_but_its_own_columns() {
-    let (scene, path) = (street(20), walk(300));
+    let (scene, path) = (street(20, 2), walk(300));
     let mut inspector = Onlooker::default();
     let mut watched = replay_before(&scene, &path, options(1 << 20), Some(&mut inspector));
     for (index, frame) in watched.frames.iter_mut().enumerate() {
