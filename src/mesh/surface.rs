@@ -4,15 +4,16 @@
 //! guide the search: a box is left out only where it is farther than the best triangle so far by
 //! more than f32 can be wrong. The distance to a triangle is computed in f64 from source
 //! coordinates. Each square of some kilometres has its own hierarchy, so that f32 stays fine where
-//! a scene holds models from both ends of a country.
+//! a scene holds models from both ends of a country, and so has each part of a million triangles:
+//! building one takes several times the memory that it then has.
 
 use std::collections::BTreeMap;
 
-use glam::{DVec3, Vec3A};
+use glam::{DVec3, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
+use rayon::prelude::*;
 
 /// Share of the extent by which a distance to a box may be wrong in f32: that of the point and
 /// that of the box's corner, along three axes.
@@ -21,11 +22,17 @@ const BOX_SLACK: f64 = 4.0 / (1 << 23) as f64;
 /// Side of the squares, metres.
 const SQUARE: f64 = 8192.0;
 
+/// What lowers the reach of a search to this has found enough.
+const ENOUGH: f64 = -1.0;
+
+/// Triangles of one hierarchy, at most.
+const MOST_TRIANGLES: usize = 1 << 20;
+
 /// A triangle mesh that can be asked for its closest point.
 pub(crate) struct Surface {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
-    squares: Vec<Square>,
+    parts: Vec<Part>,
 }
 
 impl std::fmt::Debug for Surface {
@@ -34,14 +41,24 @@ impl std::fmt::Debug for Surface {
     }
 }
 
-/// The triangles whose first corner lies in one square.
-struct Square {
-    bvh: Bvh2,
-    /// Numbers of the triangles.
+/// The triangles whose first corner lies in one square, or a part of them.
+struct Part {
+    nodes: Vec<BvhNode>,
+    /// Numbers of the triangles, those of a node side by side.
     members: Vec<u32>,
     low: DVec3,
     high: DVec3,
     slack: f64,
+}
+
+/// A node of a hierarchy, in 32 bytes.
+struct BvhNode {
+    low: Vec3,
+    /// Triangles; 0 where it has nodes below it.
+    count: u32,
+    high: Vec3,
+    /// Its first triangle among the members, or the first of two nodes below it.
+    first: u32,
 }
 
 /// A point of a surface.
@@ -67,17 +84,24 @@ impl Hit {
 impl Surface {
     /// A surface of these triangles in source coordinates.
     pub fn new(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
+        Self::in_parts(positions, triangles, MOST_TRIANGLES)
+    }
+
+    /// The same with hierarchies of at most so many triangles.
+    fn in_parts(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, most: usize) -> Self {
         let mut squares: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
         for (number, triangle) in (0..).zip(&triangles) {
             let corner = positions[triangle[0] as usize];
             let square = (corner / SQUARE).floor().to_array().map(|side| side as i64);
             squares.entry(square).or_default().push(number);
         }
-        let squares = squares
-            .into_values()
-            .map(|members| Square::new(&positions, &triangles, members))
-            .collect();
-        Self { positions, triangles, squares }
+        let mut parts = Vec::new();
+        for members in squares.into_values() {
+            divide(members, &positions, &triangles, most, &mut parts);
+        }
+        let part = |members| Part::new(&positions, &triangles, members);
+        let parts = parts.into_par_iter().map(part).collect();
+        Self { positions, triangles, parts }
     }
 
     /// Corners of a triangle.
@@ -123,6 +147,23 @@ impl Surface {
         best.map(|(_, hit)| hit)
     }
 
+    /// Some point within `reach` of `point`, on triangle `first` where that is near enough.
+    pub fn any_within(&self, point: DVec3, reach: f64, first: u32) -> Option<Hit> {
+        let squared = reach * reach;
+        let known = self.on_triangle(point, first);
+        if known.squared <= squared {
+            return Some(known);
+        }
+        let mut found = None;
+        self.search(point, reach, |hit, reach| {
+            if hit.squared <= squared {
+                found = Some(hit);
+                *reach = ENOUGH;
+            }
+        });
+        found
+    }
+
     /// The point of one triangle that is nearest to `point`.
     pub fn on_triangle(&self, point: DVec3, triangle: u32) -> Hit {
         hit(point, triangle, self.corners(triangle))
@@ -147,32 +188,54 @@ impl Surface {
 
     /// Visits the triangles whose boxes may meet the box from `low` to `high`, in no order.
     pub fn in_box(&self, low: DVec3, high: DVec3, mut visit: impl FnMut(u32)) {
-        for square in &self.squares {
-            square.in_box(low, high, &mut visit);
+        for part in &self.parts {
+            part.in_box(low, high, &mut visit);
         }
     }
 
     /// Visits the triangles that may be within `reach`, near ones first; `visit` may lower it.
     fn search(&self, point: DVec3, mut reach: f64, mut visit: impl FnMut(Hit, &mut f64)) {
-        if let [square] = &self.squares[..] {
-            return square.search(self, point, &mut reach, &mut visit);
-        }
-        let mut squares: Vec<(f64, &Square)> = self
-            .squares
-            .iter()
-            .map(|square| (point.distance(point.clamp(square.low, square.high)), square))
-            .collect();
-        squares.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (distance, square) in squares {
-            if distance > reach {
-                break;
+        let distance = |part: &Part| point.distance_squared(point.clamp(part.low, part.high));
+        let nearer = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0);
+        let numbered = self.parts.iter().zip(0..).map(|(part, number)| (distance(part), number));
+        let Some((_, nearest)) = numbered.min_by(nearer) else { return };
+        self.parts[nearest].search(self, point, &mut reach, &mut visit);
+        for (number, part) in self.parts.iter().enumerate() {
+            if number != nearest && reach != ENOUGH && distance(part) <= reach * reach {
+                part.search(self, point, &mut reach, &mut visit);
             }
-            square.search(self, point, &mut reach, &mut visit);
         }
     }
 }
 
-impl Square {
+/// Halves triangles across their longest side until a hierarchy can be built of each part.
+fn divide(
+    mut members: Vec<u32>,
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    most: usize,
+    parts: &mut Vec<Vec<u32>>,
+) {
+    if members.len() <= most {
+        members.shrink_to_fit();
+        return parts.push(members);
+    }
+    let corner = |number: &u32| positions[triangles[*number as usize][0] as usize];
+    let low = members.iter().map(corner).fold(DVec3::INFINITY, DVec3::min);
+    let high = members.iter().map(corner).fold(DVec3::NEG_INFINITY, DVec3::max);
+    let axis = (high - low).max_position();
+    let middle = members.len() / 2;
+    let by_place = |number: &u32| (corner(number)[axis], *number);
+    members.select_nth_unstable_by(middle, |a, b| {
+        let (a, b) = (by_place(a), by_place(b));
+        a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+    });
+    let others = members.split_off(middle);
+    divide(members, positions, triangles, most, parts);
+    divide(others, positions, triangles, most, parts);
+}
+
+impl Part {
     fn new(positions: &[DVec3], triangles: &[[u32; 3]], members: Vec<u32>) -> Self {
         let corners = |number: u32| triangles[number as usize].map(|v| positions[v as usize]);
         let all = || members.iter().flat_map(|&number| corners(number));
@@ -184,8 +247,15 @@ impl Square {
             .map(|&number| Aabb::from_points(&corners(number).map(|p| (p - centre).as_vec3a())))
             .collect();
         let bvh = build_bvh2(&boxes, BvhBuildParams::very_fast_build(), &mut Default::default());
-
-        Self { bvh, members, low, high, slack: (high - low).max_element() * BOX_SLACK }
+        let node = |node: &obvhs::bvh2::node::Bvh2Node| BvhNode {
+            low: node.aabb.min.into(),
+            count: node.prim_count,
+            high: node.aabb.max.into(),
+            first: node.first_index,
+        };
+        let nodes = bvh.nodes.iter().map(node).collect();
+        let members = bvh.primitive_indices.iter().map(|&at| members[at as usize]).collect();
+        Self { nodes, members, low, high, slack: (high - low).max_element() * BOX_SLACK }
     }
 
     fn in_box(&self, low: DVec3, high: DVec3, visit: &mut impl FnMut(u32)) {
@@ -194,25 +264,23 @@ impl Square {
             self.slack + (low - centre).abs().max(high - centre).abs().max_element() * BOX_SLACK;
         let wanted =
             Aabb::new((low - centre - slack).as_vec3a(), (high - centre + slack).as_vec3a());
-        let nodes = &self.bvh.nodes;
         let mut stack = Vec::with_capacity(64);
         stack.push(0u32);
         while let Some(number) = stack.pop() {
-            let node = &nodes[number as usize];
-            let bounds = node.aabb;
-            if bounds.min.cmpgt(wanted.max).any() || bounds.max.cmplt(wanted.min).any() {
+            let node = &self.nodes[number as usize];
+            let (low, high) = (Vec3A::from(node.low), Vec3A::from(node.high));
+            if low.cmpgt(wanted.max).any() || high.cmplt(wanted.min).any() {
                 continue;
             }
-            if node.is_leaf() {
-                let first = node.first_index as usize;
-                for &member in &self.bvh.primitive_indices[first..first + node.prim_count as usize]
-                {
-                    visit(self.members[member as usize]);
-                }
-            } else {
-                stack.extend([node.first_index, node.first_index + 1]);
+            match node.count {
+                0 => stack.extend([node.first, node.first + 1]),
+                _ => self.members_of(node).iter().for_each(|&member| visit(member)),
             }
         }
+    }
+
+    fn members_of(&self, node: &BvhNode) -> &[u32] {
+        &self.members[node.first as usize..][..node.count as usize]
     }
 
     fn search(
@@ -226,10 +294,9 @@ impl Square {
         let local: Vec3A = from_centre.as_vec3a();
         // A point far outside is rounded by more than the square's extent says.
         let slack = self.slack + from_centre.abs().max_element() * BOX_SLACK;
-        let nodes = &self.bvh.nodes;
         let to_box = |node: u32| {
-            let bounds = nodes[node as usize].aabb;
-            (local - local.clamp(bounds.min, bounds.max)).length_squared()
+            let BvhNode { low, high, .. } = self.nodes[node as usize];
+            (local - local.clamp(low.into(), high.into())).length_squared()
         };
         // Squares, and a last bit more.
         let limit = |reach: f64| ((reach + slack).powi(2) * (1.0 + 1e-6)) as f32;
@@ -240,17 +307,17 @@ impl Square {
             if distance > most {
                 continue;
             }
-            let node = &nodes[number as usize];
-            if node.is_leaf() {
-                let first = node.first_index as usize;
-                for &member in &self.bvh.primitive_indices[first..first + node.prim_count as usize]
-                {
-                    let triangle = self.members[member as usize];
+            let node = &self.nodes[number as usize];
+            if node.count > 0 {
+                for &triangle in self.members_of(node) {
                     visit(hit(point, triangle, surface.corners(triangle)), reach);
+                    if *reach == ENOUGH {
+                        return;
+                    }
                 }
                 most = limit(*reach);
             } else {
-                let (left, right) = (node.first_index, node.first_index + 1);
+                let (left, right) = (node.first, node.first + 1);
                 let (near, far) = ((to_box(left), left), (to_box(right), right));
                 let (near, far) = if near.0 <= far.0 { (near, far) } else { (far, near) };
                 if far.0 <= most {
@@ -333,6 +400,10 @@ mod tests {
     }
 
     fn soup(triangles: u32, at: DVec3) -> Surface {
+        soup_in_parts(triangles, at, MOST_TRIANGLES)
+    }
+
+    fn soup_in_parts(triangles: u32, at: DVec3, most: usize) -> Surface {
         let mut random = Random::new(5, 0);
         let mut positions = Vec::new();
         for _ in 0..triangles {
@@ -347,7 +418,7 @@ mod tests {
             positions.extend([centre + point(4.0), centre + point(4.0), centre + point(4.0)]);
         }
         let corners = (0..triangles).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
-        Surface::new(positions, corners)
+        Surface::in_parts(positions, corners, most)
     }
 
     #[test]
@@ -401,10 +472,43 @@ mod tests {
             here.positions.iter().chain(&there.positions).copied().collect(),
             triangles.chain(shifted).collect(),
         );
-        assert!(both.squares.len() > 1);
+        assert!(both.parts.len() > 1);
         for (at, alone) in [(DVec3::ZERO, &here), (DVec3::new(678_016.0, 5e6, 0.0), &there)] {
             let point = at + DVec3::new(3.0, 40.0, -7.0);
             assert_eq!(both.distance(point), alone.distance(point));
+        }
+    }
+
+    #[test]
+    fn parts_are_one_surface() {
+        let at = DVec3::new(678_016.0, 5_403_456.0, 300.0);
+        let (whole, parts) = (soup(300, at), soup_in_parts(300, at, 20));
+        assert!(whole.parts.len() == 1 && parts.parts.len() == 16);
+        let mut random = Random::new(7, 0);
+        for _ in 0..500 {
+            let mut point = |size: f64| DVec3::from([(); 3].map(|()| random.between(-size, size)));
+            let (point, size) = (at + point(80.0), point(30.0).abs());
+            assert_eq!(parts.closest(point), whole.closest(point));
+            let reach = size.x;
+            let within = parts.within(point, reach);
+            assert_eq!(within, whole.within(point, reach));
+            let any = parts.any_within(point, reach, 299);
+            assert_eq!(any.is_some(), !within.is_empty());
+            assert!(any.is_none_or(|hit| within.contains(&hit)));
+            let in_box = |surface: &Surface| {
+                let mut found = Vec::new();
+                surface.in_box(point - size, point + size, |triangle| {
+                    let corners = surface.corners(triangle);
+                    let low = corners.into_iter().fold(DVec3::INFINITY, DVec3::min);
+                    let high = corners.into_iter().fold(DVec3::NEG_INFINITY, DVec3::max);
+                    if low.cmple(point + size).all() && high.cmpge(point - size).all() {
+                        found.push(triangle);
+                    }
+                });
+                found.sort_unstable();
+                found
+            };
+            assert_eq!(in_box(&parts), in_box(&whole));
         }
     }
 

@@ -25,6 +25,13 @@ const SLACK: f64 = 0.02;
 const LEAST_DIVISIONS: usize = 20_000;
 const DIVISIONS_PER_TRIANGLE: f64 = 0.25;
 
+/// One vertex in so many is measured first: what is nearer than half of the farthest of these need not
+/// be known exactly.
+const SAMPLED: usize = 64;
+
+/// Vertices that one thread measures in one go.
+const CHUNK: usize = 4096;
+
 /// The largest distance between a node and the original.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NodeError {
@@ -82,12 +89,21 @@ fn joined(nodes: &[u32], geometry: &[NodeGeometry]) -> Surface {
     Surface::new(positions, triangles)
 }
 
-/// A point, the nearest triangle of the other surface, and how far it is.
+/// A point, the nearest triangle of the other surface or one that is near enough, and how far it is.
 #[derive(Clone, Copy)]
 struct Corner {
     at: DVec3,
     nearest: u32,
     distance: f64,
+}
+
+impl Corner {
+    /// The search begins with triangle `known`.
+    fn new(at: DVec3, to: &Surface, known: u32) -> Self {
+        let hit = to.closest_of(at, Some(known), |_| 1.0);
+        let (nearest, distance) = hit.map_or((known, 0.0), |hit| (hit.triangle, hit.distance()));
+        Self { at, nearest, distance }
+    }
 }
 
 /// A part of a triangle.
@@ -102,14 +118,25 @@ impl Part {
     /// the distance to one triangle is convex, so that no point is farther from it than the farthest
     /// corner.
     fn new(corners: [Corner; 3], to: &Surface) -> Self {
-        let from = |corner: &Corner| {
+        let by_way = |corner: &Corner| {
             let ways = corners.iter().map(|other| corner.at.distance(other.at));
-            let distances =
-                corners.iter().map(|other| to.on_triangle(other.at, corner.nearest).distance());
-            let by_way = corner.distance + ways.fold(0.0, f64::max);
-            by_way.min(distances.fold(0.0, f64::max))
+            corner.distance + ways.fold(0.0, f64::max)
         };
-        let bound = corners.iter().map(from).fold(f64::INFINITY, f64::min);
+        let to_nearest_of = |corner: &Corner| {
+            let distance = |other: &Corner| match other.nearest == corner.nearest {
+                true => other.distance,
+                false => to.on_triangle(other.at, corner.nearest).distance(),
+            };
+            corners.iter().map(distance).fold(0.0, f64::max)
+        };
+        let [a, b, c] = &corners;
+        let mut bound = by_way(a).min(by_way(b)).min(by_way(c)).min(to_nearest_of(a));
+        if b.nearest != a.nearest {
+            bound = bound.min(to_nearest_of(b));
+        }
+        if c.nearest != a.nearest && c.nearest != b.nearest {
+            bound = bound.min(to_nearest_of(c));
+        }
         Self { corners, bound }
     }
 }
@@ -134,26 +161,64 @@ impl PartialEq for Part {
 
 impl Eq for Part {}
 
+/// The vertices of a surface, and those of its triangles that may be farther from another than all vertices:
+/// theirs are measured exactly. Of most vertices it is enough that some triangle is near, which is found sooner
+/// than the nearest.
+fn corners(from: &Surface, to: &Surface) -> (Vec<Corner>, Vec<[u32; 3]>) {
+    let positions = from.positions();
+    let mut used = vec![false; positions.len()];
+    from.triangles().iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
+    let used: Vec<u32> = (0..).zip(used).filter(|(_, used)| *used).map(|(v, _)| v).collect();
+    let measured = |vertex: u32, known: u32| Corner::new(positions[vertex as usize], to, known);
+
+    let some = used.par_iter().step_by(SAMPLED).map(|&vertex| measured(vertex, 0).distance);
+    let reach = 0.5 * some.reduce(|| 0.0, f64::max);
+    let nearly = |vertices: &[u32]| {
+        let mut known = 0;
+        let nearly = |&vertex: &u32| {
+            let at = positions[vertex as usize];
+            let corner = match to.any_within(at, reach, known) {
+                Some(hit) => Corner { at, nearest: hit.triangle, distance: hit.distance() },
+                None => measured(vertex, known),
+            };
+            known = corner.nearest;
+            (vertex, corner)
+        };
+        vertices.iter().map(nearly).collect::<Vec<_>>()
+    };
+    let mut corners: Vec<Corner> =
+        positions.iter().map(|&at| Corner { at, nearest: 0, distance: 0.0 }).collect();
+    let found: Vec<_> = used.par_chunks(CHUNK).map(nearly).collect();
+    for (vertex, corner) in found.into_iter().flatten() {
+        corners[vertex as usize] = corner;
+    }
+
+    let largest = corners.iter().map(|corner| corner.distance).fold(0.0, f64::max);
+    let is_far = |triangle: &&[u32; 3]| {
+        let [a, b, c] = triangle.map(|vertex| corners[vertex as usize]);
+        a.distance + a.at.distance(b.at).max(a.at.distance(c.at)) > largest
+    };
+    let far: Vec<[u32; 3]> = from.triangles().par_iter().filter(is_far).copied().collect();
+    let is_near = |vertex: &u32| corners[*vertex as usize].distance <= reach;
+    let mut again: Vec<u32> = far.iter().flatten().copied().filter(is_near).collect();
+    again.par_sort_unstable();
+    again.dedup();
+    let exactly = |&vertex: &u32| (vertex, measured(vertex, corners[vertex as usize].nearest));
+    let found: Vec<_> = again.par_iter().map(exactly).collect();
+    for (vertex, corner) in found {
+        corners[vertex as usize] = corner;
+    }
+    (corners, far)
+}
+
 /// The largest distance found from one surface to another, and where.
 fn farthest(from: &Surface, to: &Surface) -> (f64, DVec3) {
     let mut best = (0.0, from.positions().first().copied().unwrap_or_default());
     if to.triangles().is_empty() {
         return (f64::INFINITY, best.1);
     }
-    let mut used = vec![false; from.positions().len()];
-    from.triangles().iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
-    let measured = |at: DVec3| {
-        let (nearest, distance) =
-            to.closest(at).map_or((0, 0.0), |hit| (hit.triangle, hit.distance()));
-        Corner { at, nearest, distance }
-    };
-    let corners: Vec<Corner> = (0..from.positions().len())
-        .into_par_iter()
-        .map(|vertex| match (used[vertex], from.positions()[vertex]) {
-            (true, at) => measured(at),
-            (false, at) => Corner { at, nearest: 0, distance: 0.0 },
-        })
-        .collect();
+    let measured = |at: DVec3, known: u32| Corner::new(at, to, known);
+    let (corners, far) = corners(from, to);
     // The first of equals.
     for corner in &corners {
         if corner.distance > best.0 {
@@ -169,8 +234,7 @@ fn farthest(from: &Surface, to: &Surface) -> (f64, DVec3) {
         let part = (!near).then(|| Part::new(corners, to));
         part.filter(|part| part.bound > largest * (1.0 + SLACK))
     };
-    let open: Vec<Part> = from
-        .triangles()
+    let open: Vec<Part> = far
         .par_iter()
         .filter_map(|triangle| part(triangle.map(|v| corners[v as usize]), largest))
         .collect();
@@ -180,7 +244,7 @@ fn farthest(from: &Surface, to: &Surface) -> (f64, DVec3) {
         let farther = |part: &Part| part.bound > largest * (1.0 + SLACK);
         let Some(next) = open.pop().filter(farther) else { break };
         let [a, b, c] = from_longest_edge(next.corners);
-        let middle = measured((a.at + b.at) * 0.5);
+        let middle = measured((a.at + b.at) * 0.5, a.nearest);
         if middle.distance > best.0 {
             best = (middle.distance, middle.at);
         }
