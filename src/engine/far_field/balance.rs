@@ -13,11 +13,17 @@ const EVERY_S: f64 = 0.25;
 /// What hides what is not looked for in every frame; it is weighed without after so many seconds.
 const LATEST_S: f64 = 0.75;
 
-/// One way is left where the other is better by this part.
+/// One way is left where the other is better by this part,
 const BETTER: f64 = 0.1;
+
+/// and by more than this: a pixel off in a hundredth of the picture.
+const VISIBLE: f64 = 0.01;
 
 /// Frames that take longer than their budget by more than this part are late.
 const LATE: f64 = 0.1;
+
+/// What one way is late beside the other says nothing where it is less of the budget than this: estimates are no better.
+const LATE_MATTERS: f64 = 0.02;
 
 /// How much more of FLIP a wrong pixel beyond a cull box is than one before it: three to five times, over
 /// walks and drives in two cities. What is far is small, and full of edges.
@@ -32,23 +38,27 @@ const COUNTED_ON: f64 = 0.85;
 /// A way is given so many seconds before it is weighed: levels come and go meanwhile.
 const SETTLES_S: f64 = 1.0;
 
-/// By how much a way to draw fell short of what was expected of it is half forgotten after so many seconds.
+/// What the way in use was is half forgotten after so many seconds: a moment in which levels have not arrived yet
+/// says little.
+const IN_USE_HALF_LIFE_S: f64 = 1.0;
+
+/// By how much the other was off what was expected of it, when it was in use, is half forgotten after so many.
 const HALF_LIFE_S: f64 = 8.0;
 
 /// Weighs, now and then, whether faces show a view better than the hierarchy, by what the image gains in
 /// the time that they leave over.
 ///
-/// Of the way that is in use it is known how wrong it is; of the other it is expected, and more so by as
-/// much as it fell short of that when it was in use last: levels may have had no time to arrive, or hide
-/// less than finer ones would.
+/// Of the way that is in use it is known what it was of late. The other is expected to be what would be chosen for
+/// it, and as much off that as it was when it was in use: levels may have had no time to arrive, or hide less
+/// than finer ones would.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Balance {
     use_faces: bool,
     since_s: f64,
-    /// Of the hierarchy alone, and with faces.
-    fell_short: [Picture; 2],
-    /// What the way in use was expected to be, where it has not been weighed since.
-    promised: Option<Picture>,
+    /// What the hierarchy alone, and with faces, was of late beside what was expected of it.
+    off: [Picture; 2],
+    /// What the way in use was of late, once it has been weighed.
+    in_use: Option<Picture>,
     alone: Visibility,
     beside: Visibility,
     in_sight: Visibility,
@@ -64,17 +74,6 @@ struct Picture {
 }
 
 impl Picture {
-    fn more(self, than: Self) -> Self {
-        Self {
-            over_ms: (self.over_ms - than.over_ms).max(0.0),
-            wrong: (self.wrong - than.wrong).max(0.0),
-        }
-    }
-
-    fn or_more(self, other: Self) -> Self {
-        Self { over_ms: self.over_ms.max(other.over_ms), wrong: self.wrong.max(other.wrong) }
-    }
-
     fn and(self, more: Self, times: f64) -> Self {
         Self {
             over_ms: self.over_ms + times * more.over_ms,
@@ -112,7 +111,7 @@ impl Balance {
             return;
         }
         let (expected, found) = self.pictures(far_field, cell, frame, front, covered);
-        self.decide(expected, found, since_s.max(0.0));
+        self.decide(expected, found, LATE_MATTERS * frame.budget_ms, since_s.max(0.0));
     }
 
     /// What the hierarchy alone and it with faces are expected to come to, and what the way in use does.
@@ -167,18 +166,23 @@ impl Balance {
         ([without_faces(&whole), with_faces(&near)], found)
     }
 
-    /// Changes to the other way where that is expected to be better than what was found of the one in use,
+    /// Changes to the other way where that is expected to be better than the one in use, of which `found` is drawn,
     /// `since_s` seconds after both were weighed last.
-    fn decide(&mut self, expected: [Picture; 2], found: Picture, since_s: f64) {
+    fn decide(&mut self, expected: [Picture; 2], found: Picture, noise_ms: f64, since_s: f64) {
         let (now, other) = (usize::from(self.use_faces), usize::from(!self.use_faces));
-        let kept = libm::exp2(-since_s / HALF_LIFE_S);
-        self.fell_short = self.fell_short.map(|short| Picture::default().and(short, kept));
-        let promised = self.promised.take().unwrap_or(expected[now]);
-        self.fell_short[now] = self.fell_short[now].or_more(found.more(promised));
-        let other = expected[other].and(self.fell_short[other], 1.0);
-        if is_better(other, found) {
+        let kept = |half_life_s: f64| libm::exp2(-since_s / half_life_s);
+        let of_late = kept(IN_USE_HALF_LIFE_S);
+        let mix = |before: Picture, found: Picture| {
+            Picture::default().and(before, of_late).and(found, 1.0 - of_late)
+        };
+        let in_use = mix(self.in_use.unwrap_or(found), found);
+        self.in_use = Some(in_use);
+        self.off[now] = mix(self.off[now], found.and(expected[now], -1.0));
+        self.off[other] = Picture::default().and(self.off[other], kept(HALF_LIFE_S));
+        let other = expected[other].and(self.off[other], 1.0);
+        if is_better(other, in_use, noise_ms) {
             self.use_faces = !self.use_faces;
-            (self.promised, self.since_s) = (Some(other), EVERY_S - SETTLES_S);
+            (self.in_use, self.since_s) = (None, EVERY_S - SETTLES_S);
         }
     }
 }
@@ -188,13 +192,15 @@ fn over_ms(of: &Outlook, frame: &FrameInput<'_>) -> f64 {
     (of.ms - (1.0 + LATE) * frame.budget_ms).max(0.0)
 }
 
-/// Whether a picture is clearly less late than another, or as late and clearly less wrong.
-fn is_better(picture: Picture, than: Picture) -> bool {
+/// Whether a picture is clearly less late than another, by more than `noise_ms`, or as late and clearly less wrong.
+fn is_better(picture: Picture, than: Picture, noise_ms: f64) -> bool {
     let clearly = |less: f64, more: f64| less < (1.0 - BETTER) * more;
-    match (clearly(picture.over_ms, than.over_ms), clearly(than.over_ms, picture.over_ms)) {
+    let is_less_late =
+        |a: Picture, b: Picture| b.over_ms - a.over_ms > noise_ms && clearly(a.over_ms, b.over_ms);
+    match (is_less_late(picture, than), is_less_late(than, picture)) {
         (true, _) => true,
         (_, true) => false,
-        _ => clearly(picture.wrong, than.wrong),
+        _ => than.wrong - picture.wrong > VISIBLE && clearly(picture.wrong, than.wrong),
     }
 }
 
@@ -216,16 +222,18 @@ mod tests {
     fn what_is_late_less_is_better_and_then_what_is_less_wrong() {
         let better = |a: [f64; 2], b: [f64; 2]| {
             [
-                is_better(picture(a[0], a[1]), picture(b[0], b[1])),
-                is_better(picture(b[0], b[1]), picture(a[0], a[1])),
+                is_better(picture(a[0], a[1]), picture(b[0], b[1]), 0.1),
+                is_better(picture(b[0], b[1]), picture(a[0], a[1]), 0.1),
             ]
         };
         assert_eq!(better([1.0, 0.5], [2.0, 0.1]), [true, false]);
         assert_eq!(better([0.0, 0.5], [1.0, 0.1]), [true, false]);
         assert_eq!(better([0.0, 0.4], [0.0, 0.5]), [true, false]);
+        assert_eq!(better([0.05, 0.4], [0.0, 0.5]), [true, false], "as late as that is noise");
         // Neither clearly.
         assert_eq!(better([1.0, 0.5], [0.95, 0.5]), [false; 2]);
         assert_eq!(better([0.0, 0.5], [0.0, 0.46]), [false; 2]);
+        assert_eq!(better([0.0, 0.001], [0.0, 0.009]), [false; 2], "neither is seen");
         assert_eq!(better([0.0, 0.0], [0.0, 0.0]), [false; 2]);
     }
 
