@@ -170,9 +170,10 @@ def write_between_markers(file, marker, text):
 
 def machine():
     """One paragraph: what the figures were measured on, when, and with what."""
-    version = subprocess.check_output(
-        ["git", "describe", "--always", "--dirty"], cwd=ROOT, text=True
-    ).strip()
+    version = subprocess.check_output(["git", "describe", "--always"], cwd=ROOT, text=True).strip()
+    # Pages that other scripts have just written change nothing that is measured.
+    changes = ["git", "diff", "--quiet", "HEAD", "--", ".", ":!docs", ":!README.md"]
+    version += "-dirty" if subprocess.run(changes, cwd=ROOT).returncode else ""
     manifest = (ROOT / "Cargo.toml").read_text()
     package = re.search(r'^version = "(.*)"', manifest, re.MULTILINE).group(1)
     compiler = subprocess.check_output(["rustc", "--version"], text=True).split()[1]

@@ -12,7 +12,7 @@
 //! | `seams`, `cut_planes`, `border`, `gaps`, `slits` | what shows where two levels meet |
 //!
 //! Without a source the leaves stand for it, and what needs it is not checked. Triangles of all
-//! nodes are kept in memory (some 30 bytes each), and the source with its search tree (some 150
+//! nodes are kept in memory (some 30 bytes each), and the source with its search tree (some 100
 //! bytes a triangle); images are decoded node by node.
 
 mod appearance;

@@ -212,7 +212,7 @@ mod tests {
     use crate::engine::FarFieldMode;
     use crate::engine::test_frame::{TestFrame, root};
     use crate::format::cells::Cells;
-    use crate::runtime::test_tree::tree;
+    use crate::runtime::test_tree::{Sketch, tree};
 
     fn picture(over_ms: f64, wrong: f64) -> Picture {
         Picture { over_ms, wrong }
@@ -244,15 +244,20 @@ mod tests {
             scene: [0; 32],
             parameters: serde_json::Value::Null,
             size: 10.0,
-            texel: 0.01,
+            texel: 0.05,
             cells: vec![cell],
             faces: Vec::new(),
         })
     }
 
-    /// A node 10 m away and one 40 m away, of which each takes 10 ms, and 10 more where it is refined.
+    /// A node 11 m away and one 41 m away, 16 m wide, of which each takes 10 ms, and 10 more where it is refined.
     fn frame(target_ms: f64) -> TestFrame {
-        let tree = tree(vec![root(10.0, 0.1, 2), root(40.0, 0.1, 2)]);
+        let wide = |distance: f64| {
+            let mut node = root(distance, 0.1, 2);
+            node.children.iter_mut().for_each(|child| child.size = 16.0);
+            Sketch { size: 16.0, ..node }
+        };
+        let tree = tree(vec![wide(10.0), wide(40.0)]);
         TestFrame { target_ms, ..TestFrame::new(tree) }
     }
 
