@@ -14,10 +14,9 @@ use super::tiles::{Tile, count};
 use super::tree::is_leaf;
 use crate::format::Scene;
 
-/// Fewer samples of a leaf than this say nothing of it.
-const FEWEST: u64 = 12;
-/// Likewise for tiles: JPEG spoils a few texels of a tile together, which several samples may meet.
-const FEWEST_TILES: u64 = 40;
+/// Fewer samples of a leaf than this say nothing of it: JPEG spoils a few texels together, which several
+/// samples may meet, and at an edge of the picture a sample may be all off.
+const FEWEST: u64 = 40;
 
 /// What the source shows at each point.
 pub(super) struct Reference {
@@ -195,7 +194,7 @@ pub(super) fn leaf_tiles(
         }
         let (_, _, tiles) = found;
         all.extend(&tiles);
-        if tiles.clear >= FEWEST_TILES {
+        if tiles.clear >= FEWEST {
             demand(&scene.nodes[leaf as usize].file, &tiles, limits.leaf_wrong_tiles);
         }
     }

@@ -13,8 +13,9 @@ use rayon::prelude::*;
 use super::geometry::NodeGeometry;
 use super::sample::cross;
 use super::seams::Seam;
-use super::tree::{apart, is_leaf};
+use super::tree::{apart, input_of, is_leaf, leaves};
 use crate::format::{Node, Scene};
+use crate::mesh::NEAR;
 
 /// How far a triangle in a cutting plane may be from it, as a share of its longest edge. A border
 /// vertex may lie beside the plane by a hundredth of the edge that was not split there.
@@ -27,7 +28,8 @@ const FACING: f64 = 0.98;
 type Plane = (usize, u64);
 
 /// Marks the triangles of coarse nodes that lie in a plane at which they were cut.
-/// Each list of seams finds planes by itself.
+/// Each list of seams finds planes by itself. Between inputs, leaves that touch in a plane are enough: what
+/// was scanned twice need not have an edge in common.
 pub(super) fn mark(
     scene: &Scene,
     geometry: &mut [NodeGeometry],
@@ -35,6 +37,13 @@ pub(super) fn mark(
     steps: &[f64],
 ) {
     let mut planes: Vec<BTreeSet<Plane>> = vec![BTreeSet::new(); geometry.len()];
+    let mut part = |[a, b]: [u32; 2], axis: usize, coordinates: [u64; 2]| {
+        for (line, coordinate) in apart(scene, a, b).into_iter().zip(coordinates) {
+            for node in line {
+                planes[node as usize].insert((axis, coordinate));
+            }
+        }
+    };
     for seams in seams {
         let mut pairs: BTreeMap<[u32; 2], Vec<&Seam>> = BTreeMap::new();
         for seam in seams {
@@ -43,12 +52,13 @@ pub(super) fn mark(
         for ([a, b], seams) in pairs {
             let nodes = [a, b].map(|leaf| &scene.nodes[leaf as usize]);
             if let Some((axis, coordinates)) = plane_between(&seams, nodes, steps[a as usize]) {
-                for (line, coordinate) in apart(scene, a, b).into_iter().zip(coordinates) {
-                    for node in line {
-                        planes[node as usize].insert((axis, coordinate));
-                    }
-                }
+                part([a, b], axis, coordinates);
             }
+        }
+    }
+    for axis in 0..3 {
+        for ([a, b], coordinates) in touching_inputs(scene, axis) {
+            part([a, b], axis, coordinates.map(f64::to_bits));
         }
     }
     geometry.par_iter_mut().enumerate().for_each(|(number, node)| {
@@ -61,6 +71,31 @@ pub(super) fn mark(
         };
         node.in_cut_plane = node.skirts.iter().zip(&node.triangles).map(in_cut_plane).collect();
     });
+}
+
+/// Leaves of two inputs of which the one's box ends where the other's begins along an axis, and where: pairs,
+/// the one that ends first. Leaves that are flat along the axis are not cut across it.
+fn touching_inputs(scene: &Scene, axis: usize) -> Vec<([u32; 2], [f64; 2])> {
+    let node = |leaf: u32| &scene.nodes[leaf as usize];
+    let is_flat = |leaf: u32| node(leaf).bbox_max[axis] - node(leaf).bbox_min[axis] <= 2.0 * NEAR;
+    let begins = |leaf: u32| node(leaf).bbox_min[axis] + 0.0;
+    let mut leaves = leaves(scene);
+    leaves.retain(|&leaf| !is_flat(leaf));
+    leaves.sort_by(|&a, &b| begins(a).total_cmp(&begins(b)));
+    let meet = |a: u32, b: u32| {
+        let overlap = |at: usize| {
+            node(a).bbox_min[at] - NEAR <= node(b).bbox_max[at]
+                && node(b).bbox_min[at] - NEAR <= node(a).bbox_max[at]
+        };
+        (0..3).all(overlap) && input_of(scene, a) != input_of(scene, b)
+    };
+    let beside = |&a: &u32| {
+        let end = node(a).bbox_max[axis] + 0.0;
+        let first = leaves.partition_point(|&b| begins(b) < end - NEAR);
+        let others = leaves[first..].iter().take_while(move |&&b| begins(b) <= end + NEAR);
+        others.filter(|&&b| meet(a, b)).map(|&b| ([a, b], [end, begins(b)])).collect::<Vec<_>>()
+    };
+    leaves.par_iter().flat_map_iter(beside).collect()
 }
 
 /// Whether a triangle of a node with this lattice step lies in a plane.
@@ -111,6 +146,7 @@ fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<(usiz
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::BlockInfo;
     use crate::format::test_scene::scene;
 
     #[test]
@@ -135,10 +171,8 @@ mod tests {
         assert_eq!(plane_between(&[&beside], [&flat[0], &flat[1]], 1e-6), None);
     }
 
-    /// Two coarse nodes with a leaf each, apart at x = 5; the first has two triangles in that plane,
-    /// which are skirts where its file says so.
-    #[test]
-    fn skirts_count_as_none_only_in_a_plane_that_bounds_their_node() {
+    /// Two coarse nodes, 1 and 2, with a leaf each, 3 and 4, apart at x = 5.
+    fn apart_at_5() -> Scene {
         let node = |parent, first_child, next_sibling, low: f64, high: f64| Node {
             parent,
             first_child,
@@ -154,7 +188,59 @@ mod tests {
             node(Some(1), None, None, 0.0, 5.0),
             node(Some(2), None, None, 5.0, 11.0),
         ];
-        let scene = Scene { nodes, ..scene() };
+        Scene { nodes, ..scene() }
+    }
+
+    /// What one scan has along a line need not have an edge in common with what another has there.
+    #[test]
+    fn inputs_are_apart_where_their_leaves_touch() {
+        let of_inputs = |inputs: [&str; 2]| {
+            let mut scene = apart_at_5();
+            let block = scene.blocks[0].clone();
+            scene.blocks = inputs
+                .iter()
+                .map(|&input| BlockInfo { input: input.into(), ..block.clone() })
+                .collect();
+            scene.nodes[0].block = None;
+            [(1, 0), (3, 0), (2, 1), (4, 1)].into_iter().for_each(|(node, block)| {
+                scene.nodes[node].block = Some(block);
+            });
+            scene
+        };
+        let scene = of_inputs(["west.obj", "east.obj"]);
+        assert_eq!(touching_inputs(&scene, 0), [([3, 4], [5.0, 5.0])]);
+        assert_eq!(touching_inputs(&scene, 1), []);
+        assert_eq!(touching_inputs(&of_inputs(["west.obj"; 2]), 0), [], "one input");
+        let changed = |change: &dyn Fn(&mut Node)| {
+            let mut scene = scene.clone();
+            change(&mut scene.nodes[4]);
+            touching_inputs(&scene, 0)
+        };
+        assert_eq!(changed(&|node| node.bbox_min[0] = 5.004), [([3, 4], [5.0, 5.004])]);
+        assert_eq!(changed(&|node| node.bbox_min[0] = 5.1), []);
+        assert_eq!(changed(&|node| node.bbox_min[1] = 9.1), [], "passes it by");
+        assert_eq!(changed(&|node| node.bbox_max[0] = 5.0), [], "flat");
+
+        let upright = [[5.0, 0.0, 1.0], [5.0, 9.0, 1.0], [5.0, 9.0, 3.0]];
+        let with_skirt = NodeGeometry {
+            positions: upright.to_vec(),
+            triangles: vec![[0, 1, 2]],
+            skirts: vec![true],
+            ..NodeGeometry::default()
+        };
+        for (scene, is_surface) in [(of_inputs(["west.obj"; 2]), true), (scene, false)] {
+            let mut geometry = vec![NodeGeometry::default(); 5];
+            geometry[1] = with_skirt.clone();
+            mark(&scene, &mut geometry, [&[], &[]], &[1e-6; 5]);
+            assert_eq!(geometry[1].is_surface(0), is_surface);
+        }
+    }
+
+    /// Two coarse nodes with a leaf each, apart at x = 5; the first has two triangles in that plane,
+    /// which are skirts where its file says so.
+    #[test]
+    fn skirts_count_as_none_only_in_a_plane_that_bounds_their_node() {
+        let scene = apart_at_5();
         let seams = [Seam {
             ends: [DVec3::new(5.0, 0.0, 0.0), DVec3::new(5.0, 9.0, 0.0)],
             leaves: [3, 4],

@@ -162,7 +162,7 @@ impl Verification<'_> {
         let seams = rims.seams();
         let between = rims.between_vertices();
         cut_planes::mark(scene, &mut geometry, [&seams, &between], &steps);
-        let points = Points::new(&leaves, &geometry, options.samples, options.seed);
+        let points = Points::new(&leaves, &geometry, options.samples(leaves.len()), options.seed);
         let images = NodeTextures::new(out, scene);
 
         progress.phase("images of the leaves", leaves.len() as u64);

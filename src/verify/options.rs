@@ -2,12 +2,18 @@
 
 use crate::{Error, Result};
 
+/// Points unless others are asked for: at least, and for each leaf, so that something can be said of most
+/// leaves of however large a scene.
+const LEAST_SAMPLES: u64 = 300_000;
+const SAMPLES_PER_LEAF: u64 = 60;
+
 /// How a scene is verified.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct VerifyOptions {
     /// Points spread over the source by area, from 1,000 on; as many again over each level. Vertices
-    /// are measured besides. More: rarer faults are found, and it takes longer.
-    pub samples: u64,
+    /// are measured besides. More: rarer faults are found, and it takes longer. `None`: 300,000, or 60 for
+    /// each leaf where that is more.
+    pub samples: Option<u64>,
     /// Draws the points; equal seeds draw equal points.
     pub seed: u64,
     /// Nodes that are listed as the worst.
@@ -24,14 +30,7 @@ pub struct VerifyOptions {
 
 impl Default for VerifyOptions {
     fn default() -> Self {
-        Self {
-            samples: 300_000,
-            seed: 1,
-            worst: 5,
-            front: None,
-            cells: 8,
-            limits: Limits::default(),
-        }
+        Self { samples: None, seed: 1, worst: 5, front: None, cells: 8, limits: Limits::default() }
     }
 }
 
@@ -44,9 +43,16 @@ impl VerifyOptions {
             return Err(Error::Usage(format!("front is {share}, expected over 0 and at most 1")));
         }
         match self.samples {
-            1_000..=1_000_000_000 => Ok(()),
-            found => Err(Error::Usage(format!("samples is {found}, expected 1000 to 1000000000"))),
+            None | Some(1_000..=1_000_000_000) => Ok(()),
+            Some(found) => {
+                Err(Error::Usage(format!("samples is {found}, expected 1000 to 1000000000")))
+            }
         }
+    }
+
+    /// How many points are spread over the source where it has so many leaves.
+    pub(super) fn samples(&self, leaves: usize) -> u64 {
+        self.samples.unwrap_or(LEAST_SAMPLES.max(SAMPLES_PER_LEAF * leaves as u64))
     }
 }
 

@@ -77,7 +77,7 @@ fn they_are_true_to_the_source() {
     let folder = parts();
     run_build(folder.path(), &[&SMALL[..], &["parts", "out"]].concat());
     let inputs = [folder.path().join("parts")];
-    let options = VerifyOptions { samples: 40_000, ..VerifyOptions::default() };
+    let options = VerifyOptions { samples: Some(40_000), ..VerifyOptions::default() };
     let report = verify(&folder.path().join("out"), &inputs, &options, &Silent).unwrap();
     let failed: Vec<_> = report.checks.iter().filter(|check| !check.passed).collect();
     assert!(failed.is_empty(), "{failed:?}");
@@ -131,7 +131,7 @@ fn streets_in_squares_have_districts_at_any_number_of_threads() {
             assert!(scene.block_roots().count() > 30 && roots(&scene) <= 8, "{}", roots(&scene));
             let text = report(&out).to_string();
             assert!(!text.contains("without texture"), "{text}");
-            let options = VerifyOptions { samples: 40_000, ..VerifyOptions::default() };
+            let options = VerifyOptions { samples: Some(40_000), ..VerifyOptions::default() };
             let found = verify(&out, &[], &options, &Silent).unwrap();
             let failed: Vec<_> = found.checks.iter().filter(|check| !check.passed).collect();
             assert!(failed.is_empty(), "{quantize:?} {failed:?}");

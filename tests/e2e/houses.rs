@@ -82,7 +82,7 @@ fn a_half_that_goes_leaves_the_other_half_closed() {
     // Halls are wider than half of what a node is cut into, and so are cut.
     let folder = built(15);
     let out = folder.path().join("out");
-    let options = VerifyOptions { samples: 40_000, ..VerifyOptions::default() };
+    let options = VerifyOptions { samples: Some(40_000), ..VerifyOptions::default() };
     let report = verify(&out, &[folder.path().join("town.obj")], &options, &Silent).unwrap();
     let failed: Vec<_> = report.checks.iter().filter(|check| !check.passed).collect();
     assert!(failed.is_empty(), "{failed:?}");
@@ -191,7 +191,7 @@ fn blocks_have_as_many_houses_as_their_root_can_stand_for() {
             houses += triangles / 16;
         }
         assert_eq!(houses, 1500, "none is cut");
-        let options = VerifyOptions { samples: 20_000, ..VerifyOptions::default() };
+        let options = VerifyOptions { samples: Some(20_000), ..VerifyOptions::default() };
         let report = verify(&out, &[folder.path().join("town.obj")], &options, &Silent).unwrap();
         let failed: Vec<_> = report.checks.iter().filter(|check| !check.passed).collect();
         assert!(failed.is_empty(), "{failed:?}");

@@ -65,7 +65,7 @@ fn check(set: &str) {
             node.triangles
         );
     }
-    let options = VerifyOptions { samples: 5_000, ..VerifyOptions::default() };
+    let options = VerifyOptions { samples: Some(5_000), ..VerifyOptions::default() };
     let verified = verify(&out, &[], &options, &Silent).unwrap();
     let failed: Vec<_> = verified.checks.iter().filter(|check| !check.passed).collect();
     assert!(failed.is_empty(), "{set}: {failed:?}");

@@ -39,7 +39,8 @@ fn nearly([x, y]: [usize; 2]) -> [f64; 3] {
 }
 
 fn verified(folder: &Path, out: &str, tiles: &str) -> VerifyReport {
-    let options = VerifyOptions { samples: 40_000, front: Some(0.2), ..VerifyOptions::default() };
+    let options =
+        VerifyOptions { samples: Some(40_000), front: Some(0.2), ..VerifyOptions::default() };
     let found = verify(&folder.join(out), &[folder.join(tiles)], &options, &Silent).unwrap();
     let failed: Vec<_> = found.checks.iter().filter(|check| !check.passed).collect();
     assert!(failed.is_empty(), "{failed:#?}");

@@ -44,7 +44,7 @@ fn city() -> CityOptions {
 }
 
 fn options() -> VerifyOptions {
-    VerifyOptions { samples: 40_000, ..VerifyOptions::default() }
+    VerifyOptions { samples: Some(40_000), ..VerifyOptions::default() }
 }
 
 pub fn report(out: &Path, with_source: bool) -> VerifyReport {

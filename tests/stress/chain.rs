@@ -56,7 +56,7 @@ impl Chain {
         let inputs: [PathBuf; 1] = [input.to_owned()];
         build(&inputs, &out, options, &Silent)?;
         let limits =
-            VerifyOptions { samples: 20_000, front: Some(0.1), ..VerifyOptions::default() };
+            VerifyOptions { samples: Some(20_000), front: Some(0.1), ..VerifyOptions::default() };
         let report = verify(&out, &inputs, &limits, &verify::Silent)?;
         let built = Built::read(&out);
         Ok(Self { folder, report, built })

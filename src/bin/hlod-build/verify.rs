@@ -26,9 +26,10 @@ pub struct VerifyArgs {
     #[arg(long)]
     json: bool,
     /// Sample points on the source, 1000 or more, and as many on each level; all vertices are
-    /// measured as well. More: rarer faults are found, and it takes longer
-    #[arg(long, value_name = "N", default_value_t = 300_000)]
-    samples: u64,
+    /// measured as well. More: rarer faults are found, and it takes longer [default: 300000, or 60 for each
+    /// leaf where that is more]
+    #[arg(long, value_name = "N")]
+    samples: Option<u64>,
     /// Seed of the sample points: the same seed gives the same figures
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
