@@ -172,6 +172,14 @@ impl SeenAreas {
         USUAL * across(tree, node, view)
     }
 
+    /// Pixels that a metre of a node takes in a view: at its nearest point, but no nearer than half of its
+    /// size. From inside of its box, a node is not all at the eye, and its area is not nothing.
+    pub fn pixels_per_metre(tree: &SceneTree, node: u32, view: &View) -> f64 {
+        let [min, max] = tree.node(node).bbox;
+        let nearest = (max - min).length() / 2.0;
+        tree.pixels_per_metre(node, view).min(view.pixels_per_metre() / nearest)
+    }
+
     /// The part of the picture of a view that such an area of a node takes, 0 to 1.
     pub fn in_picture(tree: &SceneTree, node: u32, view: &View, area: f64) -> f64 {
         (area * per_area(tree, node, view)).min(1.0)
@@ -193,12 +201,9 @@ fn across(tree: &SceneTree, node: u32, view: &View) -> f64 {
     view.frustum.covered(tree.node(node).bbox) / per_area(tree, node, view)
 }
 
-/// Pixels that a square metre of a node takes in a view: at its nearest point, but no nearer than half
-/// of its size. From inside of its box, a node is not all at the eye, and its area is not nothing.
+/// Pixels that a square metre of a node takes in a view.
 fn per_area(tree: &SceneTree, node: u32, view: &View) -> f64 {
-    let [min, max] = tree.node(node).bbox;
-    let nearest = (max - min).length() / 2.0;
-    let per_metre = tree.pixels_per_metre(node, view).min(view.pixels_per_metre() / nearest);
+    let per_metre = SeenAreas::pixels_per_metre(tree, node, view);
     per_metre * per_metre
 }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, BinaryHeap};
 
 use super::gain_over_price::{part_of_picture, removed};
 use super::ranked::{Ranked, added_ms};
-use crate::engine::{FrameInput, FrontLoad};
+use crate::engine::{FrameInput, FrontLoad, SeenAreas};
 
 /// Half of a pixel's worst is what an error of so many pixels makes of it. For the order in which nodes are
 /// refined the square root is better (`scripts/gain`), but it has no end: one node around the eye, off by a
@@ -54,7 +54,7 @@ impl Outlook {
         let refining_ms = |node: u32| added_ms(frame, node, children(node));
         let mut upgrades = BinaryHeap::new();
         let push = |upgrades: &mut BinaryHeap<Ranked>, node: u32| {
-            let per_metre = frame.tree.pixels_per_metre(node, frame.view);
+            let per_metre = SeenAreas::pixels_per_metre(frame.tree, node, frame.view);
             let gain = part_of_picture(frame, node) * removed(frame.tree, node, per_metre);
             if gain > 0.0 && !frame.tree.children(node).is_empty() {
                 upgrades.push(Ranked { rank: gain / refining_ms(node), node });
@@ -99,7 +99,7 @@ impl Outlook {
         let of = |&node: &u32| {
             let error = frame.tree.node(node).mean_error;
             part_of_picture(frame, node)
-                * wrong(error * frame.tree.pixels_per_metre(node, frame.view))
+                * wrong(error * SeenAreas::pixels_per_metre(frame.tree, node, frame.view))
         };
         self.front.iter().map(of).sum()
     }

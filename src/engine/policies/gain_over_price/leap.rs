@@ -13,9 +13,15 @@ use crate::engine::{FrameInput, FrontLoad};
 /// It is tried so often, seconds.
 const EVERY_S: f64 = 0.25;
 
-/// Where less than this part of the budget goes to what is not seen, none is tried, nor anything loaded for
-/// one. A tenth goes to it in flights, in streets a half and more.
-const LEAST_UNSEEN: f64 = 0.3;
+/// Where less than this part of the budget goes to what is not seen, or is left over, none is tried, nor
+/// anything loaded for one. A tenth goes to what is not seen in flights, in streets a half and more.
+const LEAST_TO_GAIN: f64 = 0.3;
+
+/// Where more than this part of the budget is left over, whatever the image gains is worth it.
+const LEFT_OVER: f64 = 0.1;
+
+/// So many nodes that were refined last are left as they were where, together, they take too long after all.
+const MOST_UNDONE: usize = 4;
 
 /// A node is not seen where it was in less than this part of what is under its box.
 const SEEN: f64 = 0.1;
@@ -53,9 +59,9 @@ impl Leap {
         is_due
     }
 
-    /// Tries one from a front that is full: nodes are refined by their rank for longer than there is time,
-    /// and in the time that is left without what they hide. One of them at least must rank higher than
-    /// `least`.
+    /// Tries one from a front of which no node fits that could be refined: nodes are refined by their rank for
+    /// longer than there is time, and in the time that is left without what they hide. One of them at least must
+    /// rank higher than `least`, unless there is time left over.
     pub fn find(
         &mut self,
         frame: &FrameInput<'_>,
@@ -64,7 +70,9 @@ impl Leap {
         gain: &mut Gain,
     ) -> Option<Leapt> {
         let hidden = frame.hidden?;
-        if unseen_ms(frame, front) < LEAST_UNSEEN * frame.budget_ms {
+        let left_over_ms = frame.budget_ms - drawn_ms(frame, front, &|node| frame.is_hidden(node));
+        let least = if left_over_ms > LEFT_OVER * frame.budget_ms { 0.0 } else { least };
+        if unseen_ms(frame, front) + left_over_ms < LEAST_TO_GAIN * frame.budget_ms {
             self.forget();
             return None;
         }
@@ -85,13 +93,20 @@ impl Leap {
         if leapt.highest <= least {
             return None;
         }
-        // Less is refined now, and may hide less.
-        let behind = hidden.behind(frame.tree, &leapt.front, frame.view);
-        if drawn_ms(frame, &leapt.front, &|node| behind.hides(node)) > frame.budget_ms {
-            return None;
+        // Less is refined now, and may hide less; and boxes may cover more of the image than before.
+        for _ in 0..=MOST_UNDONE {
+            if leapt.nodes.is_empty() {
+                break;
+            }
+            let behind = hidden.behind(frame.tree, &leapt.front, frame.view);
+            let is_hidden = |node: u32| behind.hides(node);
+            if drawn_ms(frame, &leapt.front, &is_hidden) <= frame.budget_ms {
+                let hidden = leapt.front.iter().copied().filter(|&node| is_hidden(node)).collect();
+                return Some(Leapt { refined: leapt.nodes, hidden });
+            }
+            leapt.undo_last();
         }
-        let hidden = leapt.front.iter().copied().filter(|&node| behind.hides(node)).collect();
-        Some(Leapt { refined: leapt.nodes, hidden })
+        None
     }
 
     /// Wants nothing in memory any more: there is time for all that is to be seen without, or nothing to gain.
@@ -161,6 +176,14 @@ impl<'a> Refined<'a> {
         }
         let gone: BTreeSet<u32> = self.nodes.iter().copied().collect();
         self.front.retain(|node| !gone.contains(node));
+    }
+
+    /// Leaves the node as it was that was refined last.
+    fn undo_last(&mut self) {
+        let Some(node) = self.nodes.pop() else { return };
+        let children = self.frame.tree.children(node);
+        self.front.retain(|at| !children.contains(at));
+        self.front.push(node);
     }
 }
 

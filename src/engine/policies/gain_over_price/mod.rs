@@ -118,6 +118,8 @@ struct GainOverPrice {
     ranks: Vec<f64>,
     /// Nodes that could be refined, the highest rank first.
     upgrades: BinaryHeap<Ranked>,
+    /// Whether any of them was passed over in the frame at hand because it rests.
+    have_rested: bool,
     /// Refined nodes of which no child in view is refined, the least rank first.
     downgrades: BinaryHeap<Ranked>,
     /// Those that make way for an upgrade.
@@ -223,23 +225,27 @@ impl GainOverPrice {
 
     /// The same of the front as it came to be: finer nodes also hide and cover other parts of the
     /// image, and coarser ones may cover more, which no node's price says.
-    fn relieve_whole(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
-        for _ in 0..MOST_ROUNDS {
+    /// Whether it was late.
+    fn relieve_whole(&mut self, frame: &FrameInput<'_>, out: &mut Selection) -> bool {
+        for round in 0..MOST_ROUNDS {
             let ms = front_ms(frame, &out.front);
             if self.relieve(frame, ms) == ms {
-                break;
+                return round > 0;
             }
             self.walk(frame);
             self.front_into(out);
         }
+        true
     }
 
     /// Refines while there is time, or what makes way; milliseconds that the frame then takes. Upgrades are
     /// left over where there is none.
     fn refine(&mut self, frame: &FrameInput<'_>, mut ms: f64) -> f64 {
+        self.have_rested = false;
         while let Some(Ranked { rank, node }) = self.upgrades.pop() {
             let least = self.worst(frame).map_or(0.0, |worst| self.ranks[worst as usize]);
             if self.levels.rests(node, rank, least) {
+                self.have_rested = true;
                 continue;
             }
             let more_ms = ms + refining_ms(frame, node);
@@ -368,12 +374,15 @@ impl Policy for GainOverPrice {
         self.front_into(out);
         let ms = self.relieve(frame, front_ms(frame, &out.front));
         let ms = self.refine(frame, ms);
-        let is_done = self.upgrades.is_empty() && ms <= frame.budget_ms;
+        // What rests is left out for good where there is no time to speak of.
+        let is_full = ms > FULL * frame.budget_ms;
+        let mut is_done =
+            self.upgrades.is_empty() && ms <= frame.budget_ms && (is_full || !self.have_rested);
         let least = self.worst(frame).map_or(0.0, |worst| self.ranks[worst as usize]);
         if self.levels.have_changed() {
             self.walk(frame);
             self.front_into(out);
-            self.relieve_whole(frame, out);
+            is_done &= !self.relieve_whole(frame, out);
         }
         if is_done {
             self.leap.forget();
@@ -383,7 +392,6 @@ impl Policy for GainOverPrice {
         out.lacking = self.lacking(frame, ms, least);
         self.request(frame, out);
         // Where there is time, whatever comes into view will be refined.
-        let is_full = ms > FULL * frame.budget_ms;
         let least = if is_full { least } else { 0.0 };
         self.ahead.request(frame, least, &self.worth, &self.options, out);
         count_culled(frame, out);

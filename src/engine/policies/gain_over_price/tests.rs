@@ -312,6 +312,38 @@ fn what_hides_the_rest_is_refined_though_there_is_time_for_it_only_then() {
 }
 
 #[test]
+fn time_is_not_left_over_because_children_hide_each_other_only_once_they_are_drawn() {
+    // 0 → 1, a wall, and 2 behind it: 12, 10 and 15 ms. All of 0 is seen.
+    let behind = Sketch { triangles: 15, ..sketch([21.0, 0.0, 0.0], 1.0, vec![]) };
+    let children = vec![sketch([11.0, 0.0, 0.0], 1.0, vec![]), behind];
+    let near = Sketch { error: 0.1, triangles: 12, ..sketch([11.0, 0.0, 0.0], 1.0, children) };
+    let mut frame = TestFrame::new(tree(vec![near]));
+    let seen = seen_past(&frame.view, &[([11.0, 0.0, 0.0], 1.5)]);
+    let mut hidden = HiddenNodes::new(frame.tree.len(), 0.1);
+    let mut policy = policy(&[]);
+    let mut last = |frame: &TestFrame, hidden: &mut HiddenNodes, frames: usize| {
+        let mut drawn = Vec::new();
+        for _ in 0..frames {
+            hidden.begin_frame(&frame.view, frame.dt_s);
+            let mut out = Selection::default();
+            let input = FrameInput { hidden: Some(hidden), seen: Some(&seen), ..frame.input() };
+            policy.select(&input, &mut out);
+            hidden.count_on(&out.counted_on);
+            drawn = hidden.drawn(&frame.tree, &out.front, &frame.view).to_vec();
+        }
+        drawn.sort_unstable();
+        drawn
+    };
+    frame.target_ms = 30.0;
+    assert_eq!(last(&frame, &mut hidden, 30), [1, 2], "there is time for both");
+    frame.target_ms = 22.0;
+    assert_eq!(last(&frame, &mut hidden, 30), [0], "there is not, and node 0 rests");
+    hidden.set(1, Some(test_wall(10.5)));
+    assert_eq!(last(&frame, &mut hidden, 60), [1], "the wall alone fits");
+    assert_eq!(last(&frame, &mut hidden, 300), [1]);
+}
+
+#[test]
 fn what_a_leap_lacks_is_asked_for_no_longer_than_frames_are_full() {
     // 0 → 1 → 2, 3, which are not in memory.
     let below = sketch([11.0, 0.0, 0.0], 1.0, (0..2).map(|_| root(10.0, 0.0, 0)).collect());
