@@ -119,7 +119,7 @@ fn front_ms(frame: &FrameInput<'_>, front: &[u32]) -> f64 {
 mod tests {
     use super::*;
     use crate::engine::test_frame::{TestFrame, root};
-    use crate::runtime::test_tree::tree;
+    use crate::runtime::test_tree::{Sketch, sketch, tree};
 
     /// Two roots, 10 ms each, which take 10 ms more where they are refined; the nearer is 0.
     fn frame(target_ms: f64) -> TestFrame {
@@ -164,5 +164,17 @@ mod tests {
     #[test]
     fn wrong_is_half_at_two_pixels() {
         assert_eq!([0.0, 2.0, 6.0].map(wrong), [0.0, 0.5, 0.75]);
+    }
+
+    #[test]
+    fn a_node_around_the_eye_is_as_far_as_half_of_its_size() {
+        let around = Sketch { size: 40.0, error: 1.0, ..sketch([0.0; 3], 1.0, vec![]) };
+        let frame = TestFrame::new(tree(vec![around]));
+        let frame = frame.input();
+        let part = part_of_picture(&frame, 0);
+        // A metre takes 50 pixels at a metre.
+        let expected = part * wrong(50.0 / (20.0 * 3_f64.sqrt()));
+        let found = Outlook::from_front(vec![0], &frame).wrong(&frame);
+        assert!(part > 0.1 && (found - expected).abs() < 1e-9, "{found} {expected}");
     }
 }
