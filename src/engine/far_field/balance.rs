@@ -253,8 +253,8 @@ mod tests {
     /// A node 11 m away and one 41 m away, 16 m wide, of which each takes 10 ms, and 10 more where it is refined.
     fn frame(target_ms: f64) -> TestFrame {
         let wide = |distance: f64| {
-            // Half a pixel off the near one, which is measured at half of its size.
-            let mut node = root(distance, 0.14, 2);
+            // The near one is off by two pixels, as far away as half of its size.
+            let mut node = root(distance, 0.5, 2);
             node.children.iter_mut().for_each(|child| child.size = 16.0);
             Sketch { size: 16.0, ..node }
         };
