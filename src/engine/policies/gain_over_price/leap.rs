@@ -61,12 +61,13 @@ impl Leap {
 
     /// Tries one from a front of which no node fits that could be refined: nodes are refined by their rank for
     /// longer than there is time, and in the time that is left without what they hide. One of them at least must
-    /// rank higher than `least`, unless there is time left over.
+    /// rank higher than `least`, unless there is time left over. What `rests` stays as it is.
     pub fn find(
         &mut self,
         frame: &FrameInput<'_>,
         front: &[u32],
         least: f64,
+        rests: &dyn Fn(u32) -> bool,
         gain: &mut Gain,
     ) -> Option<Leapt> {
         let hidden = frame.hidden?;
@@ -79,7 +80,7 @@ impl Leap {
         let stretch_ms = STRETCHES[self.next % STRETCHES.len()] * frame.budget_ms;
         self.next += 1;
         let is_hidden = |node: u32| frame.is_hidden(node);
-        let mut more = Refined::of(frame, front, &is_hidden);
+        let mut more = Refined::of(frame, front, &is_hidden, rests);
         more.refine(stretch_ms, gain);
         // What is drawn has its children asked for already.
         let drawn: BTreeSet<u32> = front.iter().copied().collect();
@@ -88,7 +89,7 @@ impl Leap {
         self.wanted.extend(more.lacking.iter().filter(is_wanted));
         let behind = hidden.behind(frame.tree, &more.front, frame.view);
         let is_hidden = |node: u32| behind.hides(node);
-        let mut leapt = Refined::of(frame, front, &is_hidden);
+        let mut leapt = Refined::of(frame, front, &is_hidden, rests);
         leapt.refine(frame.budget_ms, gain);
         if leapt.highest <= least {
             return None;
@@ -129,6 +130,7 @@ impl Leap {
 struct Refined<'a> {
     frame: &'a FrameInput<'a>,
     is_hidden: &'a dyn Fn(u32) -> bool,
+    rests: &'a dyn Fn(u32) -> bool,
     front: Vec<u32>,
     /// What was refined, coarse to fine.
     nodes: Vec<u32>,
@@ -139,18 +141,23 @@ struct Refined<'a> {
 }
 
 impl<'a> Refined<'a> {
-    fn of(frame: &'a FrameInput<'a>, front: &[u32], is_hidden: &'a dyn Fn(u32) -> bool) -> Self {
+    fn of(
+        frame: &'a FrameInput<'a>,
+        front: &[u32],
+        is_hidden: &'a dyn Fn(u32) -> bool,
+        rests: &'a dyn Fn(u32) -> bool,
+    ) -> Self {
         let (nodes, lacking) = (Vec::new(), Vec::new());
-        Self { frame, is_hidden, front: front.to_vec(), nodes, highest: 0.0, lacking }
+        Self { frame, is_hidden, rests, front: front.to_vec(), nodes, highest: 0.0, lacking }
     }
 
     /// Refines by rank what is not hidden until it takes so many milliseconds.
     fn refine(&mut self, most_ms: f64, gain: &mut Gain) {
-        let &mut Self { frame, is_hidden, .. } = self;
+        let &mut Self { frame, is_hidden, rests, .. } = self;
         let mut ms = drawn_ms(frame, &self.front, is_hidden);
         let mut upgrades = BinaryHeap::new();
         let mut push = |upgrades: &mut BinaryHeap<Ranked>, node: u32| {
-            if !frame.tree.children(node).is_empty() && !is_hidden(node) {
+            if !frame.tree.children(node).is_empty() && !is_hidden(node) && !rests(node) {
                 let rank = gain.of(frame, node) / wholly_refining_ms(frame, node);
                 if rank > 0.0 {
                     upgrades.push(Ranked { rank, node });

@@ -148,4 +148,10 @@ impl Levels {
         let may_rest = (was_still || !self.is_still()) && changed_s >= self.within_s;
         since_s < self.dwell_s || may_rest && since_s < rest_s && rank < RISEN * then.min(least)
     }
+
+    /// Whether a node rests that was brought back to its level again and again: not even a leap refines it.
+    pub fn rests_long(&self, node: u32, options: &Options) -> bool {
+        let Level { changed_s, rest_s, .. } = self.nodes[node as usize];
+        rest_s > options.backoff_s && self.now_s - changed_s < rest_s
+    }
 }

@@ -290,7 +290,8 @@ impl GainOverPrice {
     /// others make way for, does not fit otherwise.
     fn leap(&mut self, frame: &FrameInput<'_>, least: f64, out: &mut Selection) {
         let least = least * self.options.hysteresis;
-        let found = self.leap.find(frame, &out.front, least, &mut self.gain);
+        let rests = |node: u32| self.levels.rests_long(node, &self.options);
+        let found = self.leap.find(frame, &out.front, least, &rests, &mut self.gain);
         let Some(leapt) = found else { return };
         for node in leapt.refined {
             self.levels.refine(node);
