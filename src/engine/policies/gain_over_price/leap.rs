@@ -130,6 +130,7 @@ impl Leap {
 struct Refined<'a> {
     frame: &'a FrameInput<'a>,
     is_hidden: &'a dyn Fn(u32) -> bool,
+    /// What stays as it is.
     rests: &'a dyn Fn(u32) -> bool,
     front: Vec<u32>,
     /// What was refined, coarse to fine.

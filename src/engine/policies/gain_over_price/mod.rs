@@ -224,8 +224,8 @@ impl GainOverPrice {
     }
 
     /// The same of the front as it came to be: finer nodes also hide and cover other parts of the
-    /// image, and coarser ones may cover more, which no node's price says.
-    /// Whether it was late.
+    /// image, and coarser ones may cover more, which no node's price says. Whether it
+    /// was late.
     fn relieve_whole(&mut self, frame: &FrameInput<'_>, out: &mut Selection) -> bool {
         for round in 0..MOST_ROUNDS {
             let ms = front_ms(frame, &out.front);
