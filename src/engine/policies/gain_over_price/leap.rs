@@ -7,6 +7,7 @@
 use std::collections::{BTreeSet, BinaryHeap};
 
 use super::gain::Gain;
+use super::levels::Levels;
 use crate::engine::policies::ranked::{Ranked, added_ms, visible_children, wholly_refining_ms};
 use crate::engine::{FrameInput, FrontLoad};
 
@@ -28,6 +29,24 @@ const SEEN: f64 = 0.1;
 
 /// For so many times the budget nodes are refined to find out what they hide; one after the other.
 const STRETCHES: [f64; 4] = [1.2, 1.5, 2.0, 3.0];
+
+/// Which nodes a leap leaves as they are.
+pub(super) struct Rests<'a> {
+    pub levels: &'a Levels,
+    /// The least rank of those that are refined, if any is.
+    pub least: Option<f64>,
+}
+
+impl Rests<'_> {
+    fn long(&self, node: u32) -> bool {
+        self.levels.rests_long(node)
+    }
+
+    /// At its rank. A camera that gets on comes to other views than that which made a node rest.
+    fn at(&self, node: u32, rank: f64) -> bool {
+        self.levels.sways() && self.levels.rests(node, rank, self.least)
+    }
+}
 
 /// Many nodes that fit into the budget together, though one after the other they do not.
 #[derive(Clone, Debug, Default)]
@@ -59,25 +78,30 @@ impl Leap {
         is_due
     }
 
-    /// Tries one from a front of which no node fits that could be refined: nodes are refined by their rank for
-    /// longer than there is time, and in the time that is left without what they hide. One of them at least must
-    /// rank higher than `least`, unless there is time left over. What `rests` stays as it is.
+    /// Tries one from a front of which no node fits into `budget_ms` that could be refined: nodes are refined by
+    /// their rank for longer than there is time, and in the time that is left without what they hide. One of them
+    /// at least must rank higher than the least of those that are refined, by `hysteresis`, unless there is time
+    /// left over.
     pub fn find(
         &mut self,
         frame: &FrameInput<'_>,
+        budget_ms: f64,
         front: &[u32],
-        least: f64,
-        rests: &dyn Fn(u32) -> bool,
+        rests: &Rests<'_>,
+        hysteresis: f64,
         gain: &mut Gain,
     ) -> Option<Leapt> {
         let hidden = frame.hidden?;
-        let left_over_ms = frame.budget_ms - drawn_ms(frame, front, &|node| frame.is_hidden(node));
-        let least = if left_over_ms > LEFT_OVER * frame.budget_ms { 0.0 } else { least };
-        if unseen_ms(frame, front) + left_over_ms < LEAST_TO_GAIN * frame.budget_ms {
+        let left_over_ms = budget_ms - drawn_ms(frame, front, &|node| frame.is_hidden(node));
+        let least = match left_over_ms > LEFT_OVER * budget_ms {
+            true => 0.0,
+            false => rests.least.unwrap_or(0.0) * hysteresis,
+        };
+        if unseen_ms(frame, front) + left_over_ms < LEAST_TO_GAIN * budget_ms {
             self.forget();
             return None;
         }
-        let stretch_ms = STRETCHES[self.next % STRETCHES.len()] * frame.budget_ms;
+        let stretch_ms = STRETCHES[self.next % STRETCHES.len()] * budget_ms;
         self.next += 1;
         let is_hidden = |node: u32| frame.is_hidden(node);
         let mut more = Refined::of(frame, front, &is_hidden, rests);
@@ -90,20 +114,21 @@ impl Leap {
         let behind = hidden.behind(frame.tree, &more.front, frame.view);
         let is_hidden = |node: u32| behind.hides(node);
         let mut leapt = Refined::of(frame, front, &is_hidden, rests);
-        leapt.refine(frame.budget_ms, gain);
-        if leapt.highest <= least {
+        leapt.refine(budget_ms, gain);
+        if leapt.highest() <= least {
             return None;
         }
         // Less is refined now, and may hide less; and boxes may cover more of the image than before.
         for _ in 0..=MOST_UNDONE {
             if leapt.nodes.is_empty() {
-                break;
+                return None;
             }
             let behind = hidden.behind(frame.tree, &leapt.front, frame.view);
             let is_hidden = |node: u32| behind.hides(node);
-            if drawn_ms(frame, &leapt.front, &is_hidden) <= frame.budget_ms {
+            if drawn_ms(frame, &leapt.front, &is_hidden) <= budget_ms {
                 let hidden = leapt.front.iter().copied().filter(|&node| is_hidden(node)).collect();
-                return Some(Leapt { refined: leapt.nodes, hidden });
+                let refined = leapt.nodes.iter().map(|&(node, _)| node).collect();
+                return Some(Leapt { refined, hidden });
             }
             leapt.undo_last();
         }
@@ -131,12 +156,10 @@ struct Refined<'a> {
     frame: &'a FrameInput<'a>,
     is_hidden: &'a dyn Fn(u32) -> bool,
     /// What stays as it is.
-    rests: &'a dyn Fn(u32) -> bool,
+    rests: &'a Rests<'a>,
     front: Vec<u32>,
-    /// What was refined, coarse to fine.
-    nodes: Vec<u32>,
-    /// The highest rank of it.
-    highest: f64,
+    /// What was refined, coarse to fine, with ranks.
+    nodes: Vec<(u32, f64)>,
     /// What would be refined too, were its children in memory, with ranks.
     lacking: Vec<(u32, f64)>,
 }
@@ -146,10 +169,10 @@ impl<'a> Refined<'a> {
         frame: &'a FrameInput<'a>,
         front: &[u32],
         is_hidden: &'a dyn Fn(u32) -> bool,
-        rests: &'a dyn Fn(u32) -> bool,
+        rests: &'a Rests<'a>,
     ) -> Self {
         let (nodes, lacking) = (Vec::new(), Vec::new());
-        Self { frame, is_hidden, rests, front: front.to_vec(), nodes, highest: 0.0, lacking }
+        Self { frame, is_hidden, rests, front: front.to_vec(), nodes, lacking }
     }
 
     /// Refines by rank what is not hidden until it takes so many milliseconds.
@@ -158,9 +181,9 @@ impl<'a> Refined<'a> {
         let mut ms = drawn_ms(frame, &self.front, is_hidden);
         let mut upgrades = BinaryHeap::new();
         let mut push = |upgrades: &mut BinaryHeap<Ranked>, node: u32| {
-            if !frame.tree.children(node).is_empty() && !is_hidden(node) && !rests(node) {
+            if !frame.tree.children(node).is_empty() && !is_hidden(node) && !rests.long(node) {
                 let rank = gain.of(frame, node) / wholly_refining_ms(frame, node);
-                if rank > 0.0 {
+                if rank > 0.0 && !rests.at(node, rank) {
                     upgrades.push(Ranked { rank, node });
                 }
             }
@@ -175,20 +198,24 @@ impl<'a> Refined<'a> {
                 self.lacking.push((node, rank));
                 continue;
             }
-            self.highest = self.highest.max(rank);
-            self.nodes.push(node);
+            self.nodes.push((node, rank));
             for child in visible_children(frame, node) {
                 self.front.push(child);
                 push(&mut upgrades, child);
             }
         }
-        let gone: BTreeSet<u32> = self.nodes.iter().copied().collect();
+        let gone: BTreeSet<u32> = self.nodes.iter().map(|&(node, _)| node).collect();
         self.front.retain(|node| !gone.contains(node));
+    }
+
+    /// The highest rank of what was refined, 0 where nothing was.
+    fn highest(&self) -> f64 {
+        self.nodes.iter().map(|&(_, rank)| rank).fold(0.0, f64::max)
     }
 
     /// Leaves the node as it was that was refined last.
     fn undo_last(&mut self) {
-        let Some(node) = self.nodes.pop() else { return };
+        let Some((node, _)) = self.nodes.pop() else { return };
         let children = self.frame.tree.children(node);
         self.front.retain(|at| !children.contains(at));
         self.front.push(node);

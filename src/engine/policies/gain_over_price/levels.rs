@@ -1,11 +1,12 @@
 //! Which nodes are refined, since when, and how soon that may change.
 
 use super::Options;
+use super::sway::Sway;
 use crate::camera::Pose;
 use crate::engine::FrameInput;
 
 /// A node that is brought back to the level that it had within so many seconds rests longer each time.
-const BACK_WITHIN_S: f64 = 15.0;
+pub(super) const BACK_WITHIN_S: f64 = 15.0;
 
 /// Unless the budget is less than this part of what it was of late: the machine has become slower, and
 /// no node is to blame,
@@ -20,10 +21,14 @@ const OF_LATE_S: f64 = 15.0;
 /// By how much longer.
 const LONGER: f64 = 16.0;
 
+/// So many returns are counted at most.
+const MOST_RETURNS: u8 = 8;
+
 /// No longer than this.
 const LONGEST_S: f64 = 600.0;
 
-/// A node whose rank is so many times what it was need not rest any longer.
+/// A node whose rank is so many times what it was need not rest any longer; before a camera that sways so many
+/// times as much for each time that it had come back before.
 const RISEN: f64 = 2.0;
 
 /// What is known of one node.
@@ -35,6 +40,8 @@ struct Level {
     changed_s: f64,
     /// How long it rests from then on.
     rest_s: f64,
+    /// How often, one time after the other, it was soon brought back to this level.
+    returns: u8,
     /// Its rank at that time.
     rank: f64,
     /// Whether the camera stood still then.
@@ -45,6 +52,7 @@ const UNTOUCHED: Level = Level {
     is_refined: false,
     changed_s: f64::NEG_INFINITY,
     rest_s: 0.0,
+    returns: 0,
     rank: 0.0,
     was_still: false,
 };
@@ -65,6 +73,7 @@ pub(super) struct Levels {
     /// When that changed last.
     within_s: f64,
     pose: Option<Pose>,
+    sway: Sway,
     /// When the camera moved last.
     moved_s: f64,
     nodes: Vec<Level>,
@@ -74,8 +83,12 @@ impl Levels {
     pub fn begin_frame(&mut self, frame: &FrameInput<'_>, options: &Options) {
         self.nodes.resize(frame.tree.len(), UNTOUCHED);
         self.now_s += frame.dt_s;
-        if self.pose.replace(frame.view.pose) != Some(frame.view.pose) {
+        let before = self.pose.replace(frame.view.pose);
+        if before != Some(frame.view.pose) {
             self.moved_s = self.now_s;
+        }
+        if let Some(before) = before {
+            self.sway.go(&before, &frame.view.pose, frame.dt_s);
         }
         self.have_changed = false;
         let kept = libm::exp2(-frame.dt_s / OF_LATE_S);
@@ -94,6 +107,24 @@ impl Levels {
     /// Whether the camera has not moved for as long as nodes dwell.
     fn is_still(&self) -> bool {
         self.now_s - self.moved_s >= self.dwell_s
+    }
+
+    /// Whether the camera goes to and fro.
+    pub fn sways(&self) -> bool {
+        !self.is_still() && self.sway.is_to_and_fro()
+    }
+
+    /// What was refined of late was coarsened for want of time.
+    pub fn take_back(&mut self) {
+        self.sway.take_back();
+    }
+
+    /// The part of its time that a frame is filled by.
+    pub fn filled(&self) -> f64 {
+        match self.sways() {
+            true => 1.0 - self.sway.reserve(),
+            false => 1.0,
+        }
     }
 
     /// Whether any was chosen to change in this frame.
@@ -117,21 +148,27 @@ impl Levels {
         self.nodes[node as usize].is_refined = false;
     }
 
-    /// It stands for itself again, at a rank.
-    pub fn coarsen(&mut self, node: u32, rank: f64, options: &Options) {
+    /// It stands for itself again, at a rank. Whether it had been refined of late, and seen so.
+    pub fn coarsen(&mut self, node: u32, rank: f64, options: &Options) -> bool {
         self.have_changed = true;
-        let was_still = self.is_still();
+        let (was_still, sways) = (self.is_still(), self.sways());
         let level = &mut self.nodes[node as usize];
         let is_to_blame = self.slow_s.is_none_or(|slow_s| self.now_s - slow_s > AFTER_SLOW_S);
         let is_back = is_to_blame && self.now_s - level.changed_s < BACK_WITHIN_S;
         // What was refined in this very frame was never seen so.
         let was_seen = level.changed_s < self.now_s;
-        level.rest_s = match is_back && was_seen {
-            true => (level.rest_s * LONGER).clamp(options.backoff_s, LONGEST_S),
-            false => options.dwell_s,
+        level.returns = match (was_seen, is_back) {
+            (true, true) => (level.returns + 1).min(MOST_RETURNS),
+            (false, _) if sways => level.returns,
+            _ => 0,
+        };
+        level.rest_s = match level.returns {
+            0 => options.dwell_s,
+            returns => (options.backoff_s * LONGER.powi(i32::from(returns) - 1)).min(LONGEST_S),
         };
         (level.is_refined, level.changed_s) = (false, self.now_s);
         (level.rank, level.was_still) = (rank, was_still);
+        is_back && was_seen
     }
 
     /// Whether a node that is refined was not long ago.
@@ -140,18 +177,122 @@ impl Levels {
     }
 
     /// Whether a node of this rank is not to be refined yet, where the least rank of those that are
-    /// is `least`. Once a camera that moved stands still, what it takes to draw does not change, and
-    /// nothing need rest; nor once there is more or less to draw beside it.
-    pub fn rests(&self, node: u32, rank: f64, least: f64) -> bool {
-        let Level { changed_s, rest_s, rank: then, was_still, .. } = self.nodes[node as usize];
+    /// is `least`, if any is. Once a camera that moved stands still, what it takes to draw does not change, and
+    /// nothing need rest; nor once there is more or less to draw beside it. Before a camera that sways, what
+    /// comes back again and again waits for ever higher ranks, also where nothing else is refined.
+    pub fn rests(&self, node: u32, rank: f64, least: Option<f64>) -> bool {
+        let level = self.nodes[node as usize];
+        let Level { changed_s, rest_s, returns, was_still, .. } = level;
         let since_s = self.now_s - changed_s;
         let may_rest = (was_still || !self.is_still()) && changed_s >= self.within_s;
-        since_s < self.dwell_s || may_rest && since_s < rest_s && rank < RISEN * then.min(least)
+        let (risen, of_none) = match self.sways() {
+            true => (RISEN.powi(i32::from(returns)), f64::INFINITY),
+            false => (RISEN, 0.0),
+        };
+        let is_low = rank < risen * level.rank.min(least.unwrap_or(of_none));
+        since_s < self.dwell_s || may_rest && since_s < rest_s && is_low
     }
 
     /// Whether a node rests that was brought back to its level again and again: not even a leap refines it.
-    pub fn rests_long(&self, node: u32, options: &Options) -> bool {
-        let Level { changed_s, rest_s, .. } = self.nodes[node as usize];
-        rest_s > options.backoff_s && self.now_s - changed_s < rest_s
+    pub fn rests_long(&self, node: u32) -> bool {
+        let Level { changed_s, rest_s, returns, .. } = self.nodes[node as usize];
+        returns > 1 && self.now_s - changed_s < rest_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::View;
+    use crate::engine::test_frame::{TestFrame, root};
+    use crate::runtime::test_tree::tree;
+
+    /// Levels of one node that can be refined, and a camera that sways unless it stands.
+    struct Swaying {
+        frame: TestFrame,
+        levels: Levels,
+        options: Options,
+        stands: bool,
+    }
+
+    impl Swaying {
+        fn new() -> Self {
+            let mut swaying = Self {
+                frame: TestFrame::new(tree(vec![root(10.0, 0.1, 2)])),
+                levels: Levels::default(),
+                options: Options::default(),
+                stands: false,
+            };
+            swaying.pass(100);
+            swaying
+        }
+
+        fn pass(&mut self, seconds: u32) {
+            for _ in 0..seconds {
+                if !self.stands {
+                    let mut pose = self.frame.view.pose;
+                    pose.position.x = 1.0 - pose.position.x;
+                    self.frame.view =
+                        View::new(pose, self.frame.view.velocity, self.frame.view.size);
+                }
+                let input = FrameInput { dt_s: 1.0, ..self.frame.input() };
+                self.levels.begin_frame(&input, &self.options);
+            }
+        }
+
+        /// Refines the node, and coarsens it after some seconds at a rank of 1.
+        fn refine_for(&mut self, seconds: u32) -> bool {
+            self.levels.refine(0);
+            self.pass(seconds);
+            self.levels.coarsen(0, 1.0, &self.options)
+        }
+
+        /// Seconds until it rests no longer.
+        fn rests_s(&mut self, rests: impl Fn(&Levels) -> bool) -> u32 {
+            let mut seconds = 0;
+            while rests(&self.levels) {
+                self.pass(1);
+                seconds += 1;
+            }
+            seconds
+        }
+    }
+
+    #[test]
+    fn a_leap_leaves_alone_what_was_brought_back_again() {
+        let mut swaying = Swaying::new();
+        let rests_long = |levels: &Levels| levels.rests_long(0);
+        assert!(swaying.refine_for(10));
+        assert_eq!(swaying.rests_s(rests_long), 0, "once");
+        assert!(swaying.refine_for(10));
+        assert_eq!(swaying.rests_s(rests_long), 256);
+        assert!(swaying.refine_for(10));
+        assert_eq!(swaying.rests_s(rests_long), 600);
+        assert!(!swaying.refine_for(20), "not soon");
+        assert_eq!(swaying.rests_s(rests_long), 0);
+    }
+
+    #[test]
+    fn what_was_never_seen_refined_rests_as_it_did() {
+        let mut swaying = Swaying::new();
+        let rests = |levels: &Levels| levels.rests(0, 1.0, None);
+        assert!(swaying.refine_for(10));
+        assert_eq!(swaying.rests_s(rests), 16);
+        assert!(!swaying.refine_for(0));
+        assert_eq!(swaying.rests_s(rests), 16);
+    }
+
+    #[test]
+    fn the_more_often_it_was_brought_back_the_higher_it_must_rank_to_rest_no_longer() {
+        let mut swaying = Swaying::new();
+        for (times, rank) in [(1, 2.0), (2, 4.0), (3, 8.0)] {
+            swaying.refine_for(5);
+            swaying.pass(1);
+            let rests = |rank: f64| swaying.levels.rests(0, rank, Some(2.0));
+            assert_eq!([0.99, 1.01].map(|part| rests(part * rank)), [true, false], "{times}");
+        }
+        swaying.stands = true;
+        swaying.pass(2);
+        assert!(!swaying.levels.rests(0, 1.0, Some(2.0)));
     }
 }

@@ -12,6 +12,7 @@ mod ahead;
 mod gain;
 mod leap;
 mod levels;
+mod sway;
 #[cfg(test)]
 mod tests;
 mod worth;
@@ -28,7 +29,7 @@ use crate::engine::{FrameInput, Policy, Selection};
 use ahead::Ahead;
 use gain::Gain;
 pub(in crate::engine) use gain::{part_of_picture, removed};
-use leap::Leap;
+use leap::{Leap, Rests};
 use levels::Levels;
 use worth::Worth;
 
@@ -114,6 +115,8 @@ struct GainOverPrice {
     leap: Leap,
     ahead: Ahead,
     worth: Worth,
+    /// The frame at hand is filled until it takes so many milliseconds.
+    fill_ms: f64,
     /// By node: its rank, where it was visited in the frame at hand.
     ranks: Vec<f64>,
     /// Nodes that could be refined, the highest rank first.
@@ -193,11 +196,13 @@ impl GainOverPrice {
         self.push_downgrade(frame, node);
     }
 
-    fn downgrade(&mut self, frame: &FrameInput<'_>, node: u32) {
-        self.levels.coarsen(node, self.ranks[node as usize], &self.options);
+    /// Whether it had been refined of late, and seen so.
+    fn downgrade(&mut self, frame: &FrameInput<'_>, node: u32) -> bool {
+        let is_back = self.levels.coarsen(node, self.ranks[node as usize], &self.options);
         if let Some(parent) = frame.tree.node(node).parent {
             self.push_downgrade(frame, parent);
         }
+        is_back
     }
 
     /// The refined node of the least rank.
@@ -211,13 +216,22 @@ impl GainOverPrice {
         None
     }
 
+    /// Its rank.
+    fn least(&mut self, frame: &FrameInput<'_>) -> Option<f64> {
+        self.worst(frame).map(|worst| self.ranks[worst as usize])
+    }
+
     /// Coarsens until a frame of `ms` milliseconds is not late.
     fn relieve(&mut self, frame: &FrameInput<'_>, mut ms: f64) -> f64 {
         if ms > frame.budget_ms * (1.0 + self.options.slack) {
+            let mut is_back = false;
             while ms > frame.budget_ms {
                 let Some(node) = self.worst(frame) else { break };
                 ms -= refining_ms(frame, node);
-                self.downgrade(frame, node);
+                is_back |= self.downgrade(frame, node);
+            }
+            if is_back {
+                self.levels.take_back();
             }
         }
         ms
@@ -243,13 +257,13 @@ impl GainOverPrice {
     fn refine(&mut self, frame: &FrameInput<'_>, mut ms: f64) -> f64 {
         self.have_rested = false;
         while let Some(Ranked { rank, node }) = self.upgrades.pop() {
-            let least = self.worst(frame).map_or(0.0, |worst| self.ranks[worst as usize]);
+            let least = self.least(frame);
             if self.levels.rests(node, rank, least) {
                 self.have_rested = true;
                 continue;
             }
             let more_ms = ms + refining_ms(frame, node);
-            let Some(freed_ms) = self.make_way(frame, rank, more_ms - frame.budget_ms) else {
+            let Some(freed_ms) = self.make_way(frame, rank, more_ms - self.fill_ms) else {
                 self.upgrades.push(Ranked { rank, node });
                 break;
             };
@@ -278,7 +292,7 @@ impl GainOverPrice {
         let is_enough = freed_ms >= over_ms;
         for &node in &way {
             match is_enough {
-                true => self.downgrade(frame, node),
+                true => _ = self.downgrade(frame, node),
                 false => self.push_downgrade(frame, node),
             }
         }
@@ -288,10 +302,11 @@ impl GainOverPrice {
 
     /// Refines what hides so much that all of it fits, where what ranks higher than `least`, by as much as
     /// others make way for, does not fit otherwise.
-    fn leap(&mut self, frame: &FrameInput<'_>, least: f64, out: &mut Selection) {
-        let least = least * self.options.hysteresis;
-        let rests = |node: u32| self.levels.rests_long(node, &self.options);
-        let found = self.leap.find(frame, &out.front, least, &rests, &mut self.gain);
+    fn leap(&mut self, frame: &FrameInput<'_>, least: Option<f64>, out: &mut Selection) {
+        let rests = Rests { levels: &self.levels, least };
+        let hysteresis = self.options.hysteresis;
+        let found =
+            self.leap.find(frame, self.fill_ms, &out.front, &rests, hysteresis, &mut self.gain);
         let Some(leapt) = found else { return };
         for node in leapt.refined {
             self.levels.refine(node);
@@ -306,9 +321,9 @@ impl GainOverPrice {
 
     /// How many nodes would be drawn in a frame of `ms` milliseconds, were they in memory, where the
     /// least rank of what is refined is `least`.
-    fn lacking(&self, frame: &FrameInput<'_>, ms: f64, least: f64) -> u32 {
-        let makes_way = |rank: f64| rank > least * self.options.hysteresis;
-        let fits = |node: u32| ms + refining_ms(frame, node) <= frame.budget_ms;
+    fn lacking(&self, frame: &FrameInput<'_>, ms: f64, least: Option<f64>) -> u32 {
+        let makes_way = |rank: f64| rank > least.unwrap_or(0.0) * self.options.hysteresis;
+        let fits = |node: u32| ms + refining_ms(frame, node) <= self.fill_ms;
         let would_be_refined = |&node: &u32| {
             let rank = self.ranks[node as usize];
             rank > 0.0
@@ -356,6 +371,7 @@ impl Policy for GainOverPrice {
     fn select(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
         out.clear();
         self.levels.begin_frame(frame, &self.options);
+        self.fill_ms = frame.budget_ms * self.levels.filled();
         self.gain.begin_frame(frame.tree.len(), frame.dt_s);
         self.ranks.resize(frame.tree.len(), 0.0);
         self.upgrades.clear();
@@ -376,10 +392,10 @@ impl Policy for GainOverPrice {
         let ms = self.relieve(frame, front_ms(frame, &out.front));
         let ms = self.refine(frame, ms);
         // What rests is left out for good where there is no time to speak of.
-        let is_full = ms > FULL * frame.budget_ms;
+        let is_full = ms > FULL * self.fill_ms;
         let mut is_done =
             self.upgrades.is_empty() && ms <= frame.budget_ms && (is_full || !self.have_rested);
-        let least = self.worst(frame).map_or(0.0, |worst| self.ranks[worst as usize]);
+        let least = self.least(frame);
         if self.levels.have_changed() {
             self.walk(frame);
             self.front_into(out);
@@ -393,7 +409,7 @@ impl Policy for GainOverPrice {
         out.lacking = self.lacking(frame, ms, least);
         self.request(frame, out);
         // Where there is time, whatever comes into view will be refined.
-        let least = if is_full { least } else { 0.0 };
+        let least = least.filter(|_| is_full).unwrap_or(0.0);
         self.ahead.request(frame, least, &self.worth, &self.options, out);
         count_culled(frame, out);
     }

@@ -133,6 +133,45 @@ fn a_camera_that_sways_comes_to_rest() {
     assert!(without.iter().all(|&at| at > 0), "{without:?}");
 }
 
+/// How many of a fan of roots are refined or coarsened in each of ten periods, in which a camera looks to either
+/// side: not all of them are in view at a time, and fewer can be refined the more are.
+fn changes_in_a_fan() -> Vec<usize> {
+    let fan = (-5..20).map(|at| {
+        let (sin, cos) = (f64::from(at) * 0.05).sin_cos();
+        let at = [20.0 * cos, 20.0 * sin, 0.0];
+        let child = || Sketch { size: 0.2, ..sketch(at, 1.0, vec![]) };
+        Sketch { size: 0.2, error: 0.1, ..sketch(at, 1.0, vec![child(), child()]) }
+    });
+    let mut frame = TestFrame::new(tree(fan.collect()));
+    frame.target_ms = 250.0;
+    let mut policy = policy(&[]);
+    let mut refined = std::collections::BTreeMap::new();
+    let mut changes = vec![0; 10];
+    let ahead = frame.view;
+    for index in 0..3600 {
+        let yaw = 10.0 * (f64::from(index) / 360.0 * std::f64::consts::TAU).sin();
+        let turned = from_angles(UpAxis::Z, yaw, 0.0, 0.0);
+        let straight = from_angles(UpAxis::Z, 0.0, 0.0, 0.0);
+        let rotation = turned * straight.conjugate() * ahead.pose.rotation;
+        let pose = crate::camera::Pose { rotation, ..ahead.pose };
+        frame.view = View::new(pose, ahead.velocity, ahead.size);
+        // Roots have two children each.
+        for node in frame.front(&mut *policy) {
+            let is_refined = node % 3 != 0;
+            if refined.insert(node / 3, is_refined).is_some_and(|was| was != is_refined) {
+                changes[index as usize / 360] += 1;
+            }
+        }
+    }
+    changes
+}
+
+#[test]
+fn what_fills_the_time_at_one_end_of_a_sway_is_not_taken_back_at_the_other_for_good() {
+    let changes = changes_in_a_fan();
+    assert!(changes[0] > 0 && changes[3..].iter().all(|&at| at == 0), "{changes:?}");
+}
+
 /// Frames until all is refined that there is time for, once a camera that swayed stands still, or
 /// moves on; no more than five seconds of them.
 fn frames_to_refine(stands: bool) -> usize {
