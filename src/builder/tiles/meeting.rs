@@ -303,6 +303,7 @@ impl<'a> Common<'a> {
         let mut vertices: Vec<BorderVertex<f64>> = Vec::new();
         let mut common: Vec<u32> = Vec::new();
         let mut joined: Vec<[u32; 2]> = Vec::new();
+        let mut of_sides: Vec<(usize, [u32; 2])> = Vec::new();
         for edge in edges {
             let corners: [DVec3; 3] =
                 [wide(edge.open.ends[0]), wide(edge.open.ends[1]), wide(edge.open.corner)];
@@ -318,10 +319,23 @@ impl<'a> Common<'a> {
                 vertices[number as usize].surface.add_triangle(corners);
                 number
             });
-            joined.push([ends[0].min(ends[1]), ends[0].max(ends[1])]);
+            let ends = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+            joined.push(ends);
+            of_sides.push((edge.side, ends));
         }
         joined.sort_unstable();
         joined.dedup();
+        // Where one side ends, the other may go on, by as little as what is left of a triangle that the plane
+        // does not quite miss.
+        of_sides.sort_unstable();
+        of_sides.dedup();
+        let mut edges_at = vec![[0u32; 2]; vertices.len()];
+        for (side, end) in of_sides.iter().flat_map(|&(side, ends)| ends.map(|end| (side, end))) {
+            edges_at[end as usize][side] += 1;
+        }
+        for (vertex, edges) in vertices.iter_mut().zip(edges_at) {
+            vertex.fixed |= edges.contains(&1);
+        }
         let ranked = CutPlane::new(plane.axis, plane.coordinates[0], &vertices, &joined, rule);
         // Positions of the first side are those of all.
         let at: FxHashMap<PositionKey<f64>, u32> =
@@ -435,6 +449,25 @@ mod tests {
         let [alone, _] = between([&tall[0], &tall[1]], &[]);
         let [beside, _] = between([&tall[0], &tall[1]], &[&third]);
         assert!(at(&alone) > 0 && at(&beside) == 0, "{} {}", at(&alone), at(&beside));
+    }
+
+    #[test]
+    fn where_one_side_ends_stays_though_the_other_goes_on_by_a_sliver() {
+        let (one, mut other) = (ground(20, [0.0; 2], 0.0), ground(20, [20.0, 0.0], 0.0));
+        // The last cell along the plane has its corner there, and a vertex within a hair of it.
+        let part = &mut other.parts[0];
+        let (corner, beside) = (20, part.positions.len() as u32);
+        let at = part.positions[corner as usize];
+        assert_eq!(at[..2], [20.0, 20.0]);
+        part.positions.push([at[0] + 3e-5, at[1], at[2]]);
+        let corners = part.indices.as_chunks::<3>().0;
+        let last = corners.iter().position(|corners| corners.contains(&corner)).unwrap();
+        let [a, c, d] = corners[last];
+        assert_eq!(d, corner);
+        part.indices.splice(3 * last..3 * last + 3, [a, c, beside, a, beside, d]);
+        for at_the_end in between([&one, &other], &[]).map(|share| share.planes[0].keep_level(at)) {
+            assert_eq!(at_the_end, Some(0));
+        }
     }
 
     /// A plane that both surfaces lie in does not divide them.
