@@ -155,7 +155,7 @@ impl Levels {
         let level = &mut self.nodes[node as usize];
         let is_to_blame = self.slow_s.is_none_or(|slow_s| self.now_s - slow_s > AFTER_SLOW_S);
         let is_back = is_to_blame && self.now_s - level.changed_s < BACK_WITHIN_S;
-        // What was refined in this very frame was never seen so.
+        // What was refined in this very frame was never seen so; in a sway it rests as it did.
         let was_seen = level.changed_s < self.now_s;
         level.returns = match (was_seen, is_back) {
             (true, true) => (level.returns + 1).min(MOST_RETURNS),
