@@ -232,6 +232,16 @@ impl CostModel {
         self.priced_ms(load) - self.sums()[0]
     }
 
+    /// The same of so many draw calls, vertices and triangles more than there are, or fewer.
+    #[inline]
+    pub fn geometry_ms(&self, draws: f64, vertices: f64, triangles: f64) -> f64 {
+        let [_, draw, vertex, triangle, ..] = self.sums();
+        let [_, draws_per, vertices_per, triangles_per, ..] = ORDINARY;
+        draw * (draws / draws_per)
+            + vertex * (vertices / vertices_per)
+            + triangle * (triangles / triangles_per)
+    }
+
     /// Mean of (estimated − actual) / actual over the frames of late.
     pub fn relative_bias(&self) -> f64 {
         let [frames, sum, _] = self.errors;

@@ -8,9 +8,10 @@ use super::predict::predict;
 use super::settling::Settling;
 use super::steady::Steady;
 use super::{
-    Backend, CostModel, FarField, FarFieldMode, FarShown, FrameEstimate, FrameInput, FrameOutcome,
-    FrameReport, FrontCheck, FrontLoad, HiddenNodes, Inspect, Load, Occluders, Policy,
-    PredictedView, Residents, SeenAreas, Selection, ToggleCauses, Visibility, geometry_load,
+    Backend, CostModel, CoveredParts, FarField, FarFieldMode, FarShown, FrameEstimate, FrameInput,
+    FrameOutcome, FrameReport, FrontCheck, FrontLoad, HiddenNodes, Inspect, Load, Occluders,
+    Policy, PredictedView, Residents, SeenAreas, Selection, ToggleCauses, Visibility,
+    geometry_load,
 };
 use crate::camera::{Pose, View};
 use crate::format::cells::Cells;
@@ -30,6 +31,7 @@ const NEAR: f64 = 1e-5;
 struct Seen<'a> {
     tree: &'a SceneTree,
     visibility: Visibility,
+    covered: CoveredParts,
     seen: Option<SeenAreas>,
     hidden: Option<HiddenNodes>,
     predicted: Vec<PredictedView>,
@@ -51,6 +53,7 @@ impl Seen<'_> {
             tree: self.tree,
             view,
             visibility: &self.visibility,
+            covered: &self.covered,
             seen: self.seen.as_ref(),
             hidden: self.hidden.as_ref(),
             predicted: &self.predicted,
@@ -141,6 +144,7 @@ impl<'a> Engine<'a> {
             seen: Seen {
                 tree,
                 visibility: Visibility::default(),
+                covered: CoveredParts::default(),
                 seen: None,
                 hidden: None,
                 predicted: Vec::new(),
@@ -227,6 +231,7 @@ impl<'a> Engine<'a> {
         let view = &self.look_far(view);
         let seen = &mut self.seen;
         seen.visibility.begin_frame(seen.tree.len());
+        seen.covered.begin_frame(seen.tree.len());
         let is_still =
             changes.arrived.is_empty() && self.pose == Some(view.pose) && self.margin.is_known();
         let choosing_ms = self.choosing.expected_ms();
@@ -300,11 +305,11 @@ impl<'a> Engine<'a> {
 
     /// What drawing takes where all is as coarse as can be, milliseconds.
     fn least_ms(&mut self, view: &View) -> f64 {
-        let Seen { tree, steady, .. } = &self.seen;
+        let Seen { tree, steady, covered, .. } = &self.seen;
         let is_in_view = |&root: &u32| view.frustum.outside(tree.node(root).bbox) <= 0.0;
         self.roots.clear();
         self.roots.extend(tree.roots().iter().copied().filter(is_in_view));
-        steady.costs().priced_ms(&self.front_load.of(tree, &self.roots, view, 0))
+        steady.costs().priced_ms(&self.front_load.of(tree, &self.roots, view, covered, 0))
     }
 
     /// The view without what faces show of it, and as much of those that are expected.
@@ -374,9 +379,9 @@ impl<'a> Engine<'a> {
 
     /// Sets what was expected of a frame beside what it took, and learns from it.
     fn estimate(&mut self, view: &View, changes: &Changes, report: &mut FrameReport) {
-        let (costs, &Seen { tree, target_ms, least_ms, dt_s, ref steady, .. }) =
+        let (costs, &Seen { tree, target_ms, least_ms, dt_s, ref steady, ref covered, .. }) =
             (&mut self.costs, &self.seen);
-        let mut whole = self.front_load.of(tree, &self.drawn, view, changes.arrived_bytes);
+        let mut whole = self.front_load.of(tree, &self.drawn, view, covered, changes.arrived_bytes);
         let [width, height] = view.size.map(f64::from);
         self.covered = (whole.plain_fragments + whole.textured_fragments) / (width * height);
         if let Some(far_field) = &self.far_field {

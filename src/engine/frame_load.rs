@@ -1,6 +1,6 @@
 //! What a front asks of a graphics adapter, as far as boxes tell.
 
-use super::Load;
+use super::{CoveredParts, Load};
 use crate::camera::View;
 use crate::runtime::{SceneTree, TreeNode};
 
@@ -23,12 +23,13 @@ impl FrontLoad {
         tree: &SceneTree,
         front: &[u32],
         view: &View,
+        covered: &CoveredParts,
         uploaded_bytes: u64,
     ) -> Load {
         let eye = view.pose.position;
         let mut load = Load { uploaded_bytes: uploaded_bytes as f64, ..Load::default() };
         self.by_distance.clear();
-        for node in front.iter().map(|&node| tree.node(node)) {
+        for (index, node) in front.iter().map(|&node| (node, tree.node(node))) {
             let geometry = geometry_load(node);
             load.draws += geometry.draws;
             load.vertices += geometry.vertices;
@@ -39,7 +40,7 @@ impl FrontLoad {
                 triangles => f64::from(node.textured_triangles) / f64::from(triangles),
             };
             let distance = eye.distance_squared(eye.clamp(min, max));
-            self.by_distance.push((distance, view.frustum.covered(node.bbox), textured));
+            self.by_distance.push((distance, covered.of(tree, index, view), textured));
         }
         // Nodes in the same place hide each other alike, whatever their order.
         self.by_distance.sort_unstable_by(|a, b| {
@@ -47,10 +48,10 @@ impl FrontLoad {
         });
         let [width, height] = view.size.map(f64::from);
         let pixels = width * height;
-        let mut covered = 0.0;
+        let mut under_nearer = 0.0;
         for &(_, under, textured) in &self.by_distance {
-            let shaded = under * (1.0 - covered);
-            covered += shaded;
+            let shaded = under * (1.0 - under_nearer);
+            under_nearer += shaded;
             load.textured_fragments += shaded * textured * pixels;
             load.plain_fragments += shaded * (1.0 - textured) * pixels;
             load.hidden_fragments += (under - shaded) * pixels;
@@ -79,10 +80,10 @@ mod tests {
         let ahead = |x: f64| Sketch { size: 100.0, ..sketch([x, 0.0, 0.0], 1.0, vec![]) };
         let tree = tree(vec![ahead(251.0), ahead(51.0), ahead(151.0)]);
         let view = view();
-        let near = FrontLoad::default().of(&tree, &[1], &view, 0);
+        let near = FrontLoad::default().of(&tree, &[1], &view, &CoveredParts::default(), 0);
         assert_eq!((near.plain_fragments, near.hidden_fragments), (10_000.0, 0.0));
         // The others are a quarter and a sixteenth of the image, wholly behind the near one.
-        let all = FrontLoad::default().of(&tree, &[0, 1, 2], &view, 7);
+        let all = FrontLoad::default().of(&tree, &[0, 1, 2], &view, &CoveredParts::default(), 7);
         let under = [0, 2].map(|node| view.frustum.covered(tree.node(node).bbox) * 1e4);
         assert!((all.plain_fragments - 10_000.0).abs() < 1e-6);
         assert!((all.hidden_fragments - under.iter().sum::<f64>()).abs() < 1e-6);
@@ -94,7 +95,7 @@ mod tests {
     fn what_is_far_covers_little() {
         // A cube of 2 m at 11 m, seen 90° high: its near face is 2 / 20 of either side.
         let tree = tree(vec![sketch([11.0, 0.0, 0.0], 1.0, vec![])]);
-        let load = FrontLoad::default().of(&tree, &[0], &view(), 0);
+        let load = FrontLoad::default().of(&tree, &[0], &view(), &CoveredParts::default(), 0);
         assert!((load.plain_fragments - 100.0).abs() < 1e-9);
     }
 }

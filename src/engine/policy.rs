@@ -1,6 +1,6 @@
 //! The boundary at which ways of choosing levels of detail differ.
 
-use super::{CostModel, HiddenNodes, Residents, SeenAreas, Visibility};
+use super::{CostModel, CoveredParts, HiddenNodes, Residents, SeenAreas, Visibility};
 use crate::camera::View;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::MemoryUse;
@@ -14,6 +14,9 @@ pub struct FrameInput<'a> {
     pub view: &'a View,
     /// What was found so far of what it has in view: asked for by [`is_visible`](Self::is_visible).
     pub visibility: &'a Visibility,
+    /// What was found so far of how much of the picture is under boxes: asked for by
+    /// [`covered`](Self::covered).
+    pub covered: &'a CoveredParts,
     /// How much of nodes is seen past what is before them, for policies that
     /// [ask for it](Policy::wants_seen_areas).
     pub seen: Option<&'a SeenAreas>,
@@ -53,6 +56,11 @@ impl FrameInput<'_> {
     pub fn is_visible(&self, node: u32) -> bool {
         let find = || self.view.frustum.outside(self.tree.node(node).bbox) <= 0.0;
         self.visibility.get_or(node, find)
+    }
+
+    /// The part of the picture, 0 to 1, under the box of a node.
+    pub fn covered(&self, node: u32) -> f64 {
+        self.covered.of(self.tree, node, self.view)
     }
 
     /// Whether a node takes no time, since nothing of it would be seen, nor has been for a while: what

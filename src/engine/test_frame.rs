@@ -1,7 +1,9 @@
 //! What policies see, for their tests.
 
 use super::policies::{PolicyKind, Settings};
-use super::{CostModel, FrameInput, Policy, Prices, Residents, Selection, Visibility};
+use super::{
+    CostModel, CoveredParts, FrameInput, Policy, Prices, Residents, Selection, Visibility,
+};
 use crate::camera::View;
 use crate::runtime::SceneTree;
 use crate::runtime::residency::MemoryUse;
@@ -13,6 +15,7 @@ pub(crate) struct TestFrame {
     pub view: View,
     /// Remembers nothing.
     pub visibility: Visibility,
+    pub covered: CoveredParts,
     pub residents: Residents,
     pub costs: CostModel,
     pub memory: MemoryUse,
@@ -41,6 +44,7 @@ impl TestFrame {
             tree,
             view: view(),
             visibility: Visibility::default(),
+            covered: CoveredParts::default(),
             costs: CostModel::new(&triangles_alone(1.0)),
             memory: MemoryUse { cap_bytes: 1 << 30, used_bytes: 0, requested_bytes: 0 },
             target_ms: 10.0,
@@ -53,6 +57,7 @@ impl TestFrame {
             tree: &self.tree,
             view: &self.view,
             visibility: &self.visibility,
+            covered: &self.covered,
             seen: None,
             hidden: None,
             predicted: &[],

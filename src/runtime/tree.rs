@@ -59,6 +59,7 @@ pub struct SceneTree {
     roots: u32,
     levels: usize,
     bounds: [DVec3; 2],
+    diagonal: f64,
     up: DVec3,
 }
 
@@ -95,7 +96,8 @@ impl SceneTree {
         let bounds = scene.bounds().unwrap_or_default().map(DVec3::from);
         let levels = scene.level_count();
         let up = scene.up.from_z_up(DVec3::Z);
-        Self { nodes, indices, places, roots, levels, bounds, up }
+        let diagonal = bounds[0].distance(bounds[1]);
+        Self { nodes, indices, places, roots, levels, bounds, diagonal, up }
     }
 
     /// Computes costs anew (eq. 3.1) with another `c_textured` than that of the build: how much
@@ -133,6 +135,11 @@ impl SceneTree {
     /// The finer nodes that together show the same piece.
     pub fn children(&self, index: u32) -> &[u32] {
         self.at(self.node(index).children.clone()).0
+    }
+
+    /// The same themselves.
+    pub fn child_nodes(&self, index: u32) -> &[TreeNode] {
+        self.at(self.node(index).children.clone()).1
     }
 
     /// The nodes without parent.
@@ -179,7 +186,7 @@ impl SceneTree {
 
     /// Length of the diagonal of the box around everything, metres.
     pub fn diagonal(&self) -> f64 {
-        self.bounds[0].distance(self.bounds[1])
+        self.diagonal
     }
 
     /// The middle of that box.

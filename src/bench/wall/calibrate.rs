@@ -13,7 +13,7 @@ use crate::bench::statistics::{deviation, percentile};
 use crate::camera::{CameraPath, Pose, View};
 use crate::engine::policies::{PolicyKind, Settings};
 use crate::engine::{
-    CostModel, FrameInput, FrontLoad, Load, Prices, Residents, Selection, Visibility,
+    CostModel, CoveredParts, FrameInput, FrontLoad, Load, Prices, Residents, Selection, Visibility,
 };
 use crate::loading::NodeFiles;
 use crate::render::Renderer;
@@ -87,7 +87,8 @@ impl Samples {
         let view = View::new(*pose, DVec3::ZERO, measured.renderer().options().size);
         let (first_ms, times) = times(measured.renderer(), front, pose, tree.near_plane())?;
         let ms = percentile(&times, 50.0);
-        self.frames.push((FrontLoad::default().of(tree, front, &view, 0), ms));
+        self.frames
+            .push((FrontLoad::default().of(tree, front, &view, &CoveredParts::default(), 0), ms));
         self.measured.push((TileLoad::default().of(tree, &[], front, &view), ms));
         self.noise.push(deviation(&times) / ms);
         self.cold_ms += first_ms - ms;
@@ -156,6 +157,7 @@ fn choose(tree: &SceneTree, pose: &Pose, size: [u32; 2], pixels: f64) -> Result<
         tree,
         view: &View::new(*pose, DVec3::ZERO, size),
         visibility: &Visibility::default(),
+        covered: &CoveredParts::default(),
         seen: None,
         hidden: None,
         predicted: &[],

@@ -22,6 +22,6 @@ mod test_mesh;
 pub use hidden_nodes::HiddenNodes;
 pub use node_occlusion::NodeOcclusion;
 pub use occluders::Occluders;
-pub use seen_areas::SeenAreas;
+pub use seen_areas::{NodeScale, SeenAreas};
 #[cfg(test)]
 pub(in crate::engine) use test_mesh::{seen_past, test_wall};

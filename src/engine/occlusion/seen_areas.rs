@@ -140,7 +140,9 @@ impl SeenAreas {
     /// Square metres across the line of sight in which a node was seen; `None` where it was out of the
     /// view that is known.
     pub fn of(&self, tree: &SceneTree, node: u32) -> Option<f64> {
-        Some(self.part(tree, node)? * across(tree, node, &self.known.as_ref()?.view))
+        let view = &self.known.as_ref()?.view;
+        let covered = view.frustum.covered(tree.node(node).bbox);
+        Some(self.part(tree, node)? * NodeScale::of(tree, node, view).area(covered))
     }
 
     /// The part of what is under a node's box in which the node was seen, above 0 and to 1; `None` as
@@ -167,22 +169,46 @@ impl SeenAreas {
         Some((f64::from(seen) + WEIGHT * USUAL) / (f64::from(looked) + WEIGHT))
     }
 
-    /// The same where nothing is known, from a view.
-    pub fn usual(tree: &SceneTree, node: u32, view: &View) -> f64 {
-        USUAL * across(tree, node, view)
+    /// The same where nothing is known, from a view with this scale of the node and this part of its picture
+    /// under the node's box.
+    pub fn usual(scale: NodeScale, covered: f64) -> f64 {
+        USUAL * scale.area(covered)
     }
+}
 
-    /// Pixels that a metre of a node takes in a view: at its nearest point, but no nearer than half of its
-    /// size. From inside of its box, a node is not all at the eye, and its area is not nothing.
-    pub fn pixels_per_metre(tree: &SceneTree, node: u32, view: &View) -> f64 {
+/// Pixels that a metre of a node takes in a view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NodeScale {
+    /// At its nearest point.
+    pub nearest: f64,
+    /// The same, but no nearer than half of its size: from inside of its box, a node is not all at the eye,
+    /// and its area is not nothing.
+    pub whole: f64,
+}
+
+impl NodeScale {
+    /// That of a node in a view.
+    pub fn of(tree: &SceneTree, node: u32, view: &View) -> Self {
         let [min, max] = tree.node(node).bbox;
-        let nearest = (max - min).length() / 2.0;
-        tree.pixels_per_metre(node, view).min(view.pixels_per_metre() / nearest)
+        let half = (max - min).length() / 2.0;
+        let nearest = tree.pixels_per_metre(node, view);
+        Self { nearest, whole: nearest.min(view.pixels_per_metre() / half) }
     }
 
-    /// The part of the picture of a view that such an area of a node takes, 0 to 1.
-    pub fn in_picture(tree: &SceneTree, node: u32, view: &View, area: f64) -> f64 {
-        (area * per_area(tree, node, view)).min(1.0)
+    /// The part of the picture that an area of the node takes, 0 to 1; square metres across the line of sight,
+    /// as parts of the picture at a pixel a metre.
+    pub fn part_of_picture(self, area: f64) -> f64 {
+        (area * self.per_area()).min(1.0)
+    }
+
+    /// The area that takes such a part of the picture.
+    fn area(self, part: f64) -> f64 {
+        part / self.per_area()
+    }
+
+    /// Pixels that a square metre takes.
+    fn per_area(self) -> f64 {
+        self.whole * self.whole
     }
 }
 
@@ -193,18 +219,6 @@ fn standing_for(tree: &SceneTree, mut node: u32, nodes: &FxHashSet<u32>) -> u32 
         node = parent;
     }
     node
-}
-
-/// Square metres across the line of sight that are under the box of a node; as parts of the picture
-/// at a pixel a metre.
-fn across(tree: &SceneTree, node: u32, view: &View) -> f64 {
-    view.frustum.covered(tree.node(node).bbox) / per_area(tree, node, view)
-}
-
-/// Pixels that a square metre of a node takes in a view.
-fn per_area(tree: &SceneTree, node: u32, view: &View) -> f64 {
-    let per_metre = SeenAreas::pixels_per_metre(tree, node, view);
-    per_metre * per_metre
 }
 
 /// The columns and rows of which the middles are in a rectangle of the picture.
@@ -248,7 +262,11 @@ mod tests {
         let tree = tree([11.3, 21.3].map(|x| sketch([x, 0.0, 0.0], 1.0, vec![])).into());
         let mut areas = areas(surfaces);
         areas.look(&tree, &view(), 0.0);
-        [0, 1].map(|node| areas.of(&tree, node).unwrap() / across(&tree, node, &view()))
+        let under = |node: u32| {
+            let covered = view().frustum.covered(tree.node(node).bbox);
+            NodeScale::of(&tree, node, &view()).area(covered)
+        };
+        [0, 1].map(|node| areas.of(&tree, node).unwrap() / under(node))
     }
 
     #[test]
@@ -307,9 +325,10 @@ mod tests {
         let mut above = view();
         above.pose.position.z += 0.5;
         let above = View::new(above.pose, DVec3::ZERO, above.size);
-        let area = SeenAreas::usual(&tree, 0, &view());
-        let part = SeenAreas::in_picture(&tree, 0, &above, area);
-        let expected = USUAL * above.frustum.covered(tree.node(0).bbox);
+        let covered = |view: &View| view.frustum.covered(tree.node(0).bbox);
+        let area = SeenAreas::usual(NodeScale::of(&tree, 0, &view()), covered(&view()));
+        let part = NodeScale::of(&tree, 0, &above).part_of_picture(area);
+        let expected = USUAL * covered(&above);
         assert!((0.5..2.5).contains(&(part / expected)), "{part} {expected}");
     }
 }

@@ -79,7 +79,7 @@ impl AdaptiveDisplay {
         let &FrameInput { tree, view, .. } = frame;
         let at = tree.node(node);
         let [width, height] = view.size.map(f64::from);
-        let size = view.frustum.covered(at.bbox) * width * height;
+        let size = frame.covered(node) * width * height;
         let to_node = (at.bbox[0] + at.bbox[1]) / 2.0 - view.pose.position;
         let aside = 1.0 - to_node.normalize_or_zero().dot(view.frustum.forward).max(0.0);
         let focus = 1.0 - self.options.focus * aside;

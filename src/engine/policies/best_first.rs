@@ -95,7 +95,7 @@ fn rank(frame: &FrameInput<'_>, node: u32) -> f64 {
     let nearest = view.pose.position.clamp(at.bbox[0], at.bbox[1]);
     let distance = view.pose.position.distance(nearest).max(tree.diagonal() * 1e-6);
     let pixels = removed.max(0.0) * view.pixels_per_metre() / distance;
-    view.frustum.covered(at.bbox) * pixels / refining_ms(frame, node)
+    frame.covered(node) * pixels / refining_ms(frame, node)
 }
 
 /// How useful a node is: as refining its parent is.

@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, BinaryHeap};
 
 use super::gain_over_price::{part_of_picture, removed};
 use super::ranked::{Ranked, added_ms};
-use crate::engine::{FrameInput, FrontLoad, SeenAreas};
+use crate::engine::{FrameInput, FrontLoad, NodeScale};
 
 /// Half of a pixel's worst is what an error of so many pixels makes of it. For the order in which nodes are
 /// refined the square root is better (`scripts/gain`), but it has no end: one node around the eye, off by a
@@ -54,7 +54,7 @@ impl Outlook {
         let refining_ms = |node: u32| added_ms(frame, node, children(node));
         let mut upgrades = BinaryHeap::new();
         let push = |upgrades: &mut BinaryHeap<Ranked>, node: u32| {
-            let per_metre = SeenAreas::pixels_per_metre(frame.tree, node, frame.view);
+            let per_metre = NodeScale::of(frame.tree, node, frame.view).whole;
             let gain = part_of_picture(frame, node) * removed(frame.tree, node, per_metre);
             if gain > 0.0 && !frame.tree.children(node).is_empty() {
                 upgrades.push(Ranked { rank: gain / refining_ms(node), node });
@@ -99,7 +99,7 @@ impl Outlook {
         let of = |&node: &u32| {
             let error = frame.tree.node(node).mean_error;
             part_of_picture(frame, node)
-                * wrong(error * SeenAreas::pixels_per_metre(frame.tree, node, frame.view))
+                * wrong(error * NodeScale::of(frame.tree, node, frame.view).whole)
         };
         self.front.iter().map(of).sum()
     }
@@ -111,7 +111,7 @@ pub fn wrong(error_px: f64) -> f64 {
 }
 
 fn front_ms(frame: &FrameInput<'_>, front: &[u32]) -> f64 {
-    let load = FrontLoad::default().of(frame.tree, front, frame.view, 0);
+    let load = FrontLoad::default().of(frame.tree, front, frame.view, frame.covered, 0);
     frame.costs.priced_ms(&load)
 }
 

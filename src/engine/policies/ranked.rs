@@ -2,7 +2,8 @@
 
 use std::cmp::Ordering;
 
-use crate::engine::{FrameInput, FrontLoad, Load, Selection, geometry_load};
+use crate::engine::{FrameInput, FrontLoad, Selection};
+use crate::runtime::TreeNode;
 
 /// Milliseconds; nothing is free, so that gains can be divided by costs.
 const LEAST_MS: f64 = 1e-6;
@@ -50,7 +51,7 @@ pub(super) fn refining_ms(frame: &FrameInput<'_>, node: u32) -> f64 {
 
 /// The same of all its children, whatever of them is in view.
 pub(super) fn wholly_refining_ms(frame: &FrameInput<'_>, node: u32) -> f64 {
-    added_ms(frame, node, frame.tree.children(node).iter().copied())
+    added_by(frame, node, frame.tree.child_nodes(node).iter())
 }
 
 /// Milliseconds that some of the children of a node take more than the node; more than 0.
@@ -59,14 +60,21 @@ pub(super) fn added_ms(
     node: u32,
     children: impl Iterator<Item = u32>,
 ) -> f64 {
-    let load = |node: u32| geometry_load(frame.tree.node(node));
-    let mut sum = Load::default();
-    for child in children.map(load) {
-        sum.draws += child.draws;
-        sum.vertices += child.vertices;
-        sum.triangles += child.triangles;
+    added_by(frame, node, children.map(|child| frame.tree.node(child)))
+}
+
+fn added_by<'a>(
+    frame: &FrameInput<'_>,
+    node: u32,
+    children: impl Iterator<Item = &'a TreeNode>,
+) -> f64 {
+    let of = |node: &TreeNode| [node.draws, node.vertices, node.triangles].map(i64::from);
+    let mut more = of(frame.tree.node(node)).map(|count| -count);
+    for child in children.map(of) {
+        (0..3).for_each(|at| more[at] += child[at]);
     }
-    (frame.costs.added_ms(&sum) - frame.costs.added_ms(&load(node))).max(LEAST_MS)
+    let [draws, vertices, triangles] = more.map(|count| count as f64);
+    frame.costs.geometry_ms(draws, vertices, triangles).max(LEAST_MS)
 }
 
 /// Counts what was visited outside of the view, once all requests are made.
@@ -78,6 +86,6 @@ pub(super) fn count_culled(frame: &FrameInput<'_>, out: &mut Selection) {
 /// Milliseconds of a frame that draws what of a front is not hidden.
 pub(super) fn front_ms(frame: &FrameInput<'_>, front: &[u32]) -> f64 {
     let drawn: Vec<u32> = front.iter().copied().filter(|&node| !frame.is_hidden(node)).collect();
-    let load = FrontLoad::default().of(frame.tree, &drawn, frame.view, 0);
+    let load = FrontLoad::default().of(frame.tree, &drawn, frame.view, frame.covered, 0);
     frame.costs.priced_ms(&load)
 }

@@ -64,7 +64,7 @@ struct ScreenArea {
 
 /// The part of the image under the rectangle around a node's projected box.
 fn area(frame: &FrameInput<'_>, node: u32) -> f64 {
-    frame.view.frustum.covered(frame.tree.node(node).bbox)
+    frame.covered(node)
 }
 
 fn utility(frame: &FrameInput<'_>, node: u32) -> f64 {

@@ -151,7 +151,7 @@ fn a_still_camera_converges_and_then_toggles_nothing() {
             let mut loads = crate::engine::FrontLoad::default();
             for _ in 0..6000 {
                 let selection = frame.select(&mut *policy);
-                let load = loads.of(&frame.tree, &selection.front, &frame.view, 0);
+                let load = loads.of(&frame.tree, &selection.front, &frame.view, &frame.covered, 0);
                 let ms = frame.costs.estimate(&load).mean_ms;
                 policy.drawn(&FrameOutcome { actual_ms: ms, frame_ms: ms });
                 fronts.push(selection.front);

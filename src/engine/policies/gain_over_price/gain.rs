@@ -1,7 +1,7 @@
 //! What the image gains where a node gives way to its children.
 
 use crate::camera::View;
-use crate::engine::{FrameInput, SeenAreas};
+use crate::engine::{FrameInput, NodeScale, SeenAreas};
 use crate::runtime::SceneTree;
 
 /// What was seen of a node is half forgotten after so many seconds.
@@ -37,34 +37,35 @@ impl Gain {
     /// What the image gains by the children of a node: the part of it in which the node is seen, times
     /// how much less wrong its pixels are.
     pub fn of(&mut self, frame: &FrameInput<'_>, node: u32) -> f64 {
-        let per_metre = frame.tree.pixels_per_metre(node, frame.view);
-        let area = self.seen(frame, node);
-        SeenAreas::in_picture(frame.tree, node, frame.view, area)
-            * removed(frame.tree, node, per_metre)
+        let scale = NodeScale::of(frame.tree, node, frame.view);
+        let area = self.seen(frame, node, scale);
+        scale.part_of_picture(area) * removed(frame.tree, node, scale.nearest)
     }
 
     /// The most that was seen of a node, of late.
-    fn seen(&mut self, frame: &FrameInput<'_>, node: u32) -> f64 {
-        let &FrameInput { tree, view, seen, .. } = frame;
+    fn seen(&mut self, frame: &FrameInput<'_>, node: u32, scale: NodeScale) -> f64 {
+        let &FrameInput { tree, seen, .. } = frame;
         let picture = seen.map_or(0, SeenAreas::picture);
         let before = self.nodes[node as usize];
-        let area = before.area * libm::exp2((before.then_s - self.now_s) / HALF_LIFE_S);
+        let usual = || SeenAreas::usual(scale, frame.covered(node));
         let found = match seen {
             _ if !frame.is_visible(node) => 0.0,
-            None => SeenAreas::usual(tree, node, view),
+            None => usual(),
             Some(_) if before.picture == picture => 0.0,
-            Some(seen) => seen.of(tree, node).unwrap_or_else(|| SeenAreas::usual(tree, node, view)),
+            Some(seen) => seen.of(tree, node).unwrap_or_else(usual),
         };
-        let area = area.max(found);
+        let kept = || before.area * libm::exp2((before.then_s - self.now_s) / HALF_LIFE_S);
+        let area = if found >= before.area { found } else { found.max(kept()) };
         self.nodes[node as usize] = Seen { area, then_s: self.now_s, picture };
         area
     }
 
     /// The same from another view, as far as is seen of nodes as a rule.
     pub fn expected(tree: &SceneTree, node: u32, view: &View) -> f64 {
-        let per_metre = tree.pixels_per_metre(node, view);
-        let area = SeenAreas::usual(tree, node, view);
-        SeenAreas::in_picture(tree, node, view, area) * removed(tree, node, per_metre)
+        let scale = NodeScale::of(tree, node, view);
+        let covered = view.frustum.covered(tree.node(node).bbox);
+        let area = SeenAreas::usual(scale, covered);
+        scale.part_of_picture(area) * removed(tree, node, scale.nearest)
     }
 
     /// The same of what need not be in view, where all of it would be seen.
@@ -79,16 +80,16 @@ impl Gain {
 
 /// How much less wrong each pixel of a node is by its children.
 pub(in crate::engine) fn removed(tree: &SceneTree, node: u32, per_metre: f64) -> f64 {
-    let (at, children) = (tree.node(node), tree.children(node));
+    let (at, children) = (tree.node(node), tree.child_nodes(node));
     let wrong = |error: f64| (error * per_metre).sqrt();
-    let errors = children.iter().map(|&child| wrong(tree.node(child).mean_error));
+    let errors = children.iter().map(|child| wrong(child.mean_error));
     (wrong(at.mean_error) - errors.sum::<f64>() / children.len().max(1) as f64).max(0.0)
 }
 
 /// The part of the picture in which a node is seen now, 0 to 1.
 pub(in crate::engine) fn part_of_picture(frame: &FrameInput<'_>, node: u32) -> f64 {
     let &FrameInput { tree, view, seen, .. } = frame;
+    let scale = NodeScale::of(tree, node, view);
     let area = seen.and_then(|seen| seen.of(tree, node));
-    let area = area.unwrap_or_else(|| SeenAreas::usual(tree, node, view));
-    SeenAreas::in_picture(tree, node, view, area)
+    scale.part_of_picture(area.unwrap_or_else(|| SeenAreas::usual(scale, frame.covered(node))))
 }

@@ -115,7 +115,7 @@ impl Leap {
         let is_hidden = |node: u32| behind.hides(node);
         let mut leapt = Refined::of(frame, front, &is_hidden, rests);
         leapt.refine(budget_ms, gain);
-        if leapt.highest() <= least {
+        if leapt.highest <= least {
             return None;
         }
         // Less is refined now, and may hide less; and boxes may cover more of the image than before.
@@ -127,8 +127,7 @@ impl Leap {
             let is_hidden = |node: u32| behind.hides(node);
             if drawn_ms(frame, &leapt.front, &is_hidden) <= budget_ms {
                 let hidden = leapt.front.iter().copied().filter(|&node| is_hidden(node)).collect();
-                let refined = leapt.nodes.iter().map(|&(node, _)| node).collect();
-                return Some(Leapt { refined, hidden });
+                return Some(Leapt { refined: leapt.nodes, hidden });
             }
             leapt.undo_last();
         }
@@ -158,8 +157,10 @@ struct Refined<'a> {
     /// What stays as it is.
     rests: &'a Rests<'a>,
     front: Vec<u32>,
-    /// What was refined, coarse to fine, with ranks.
-    nodes: Vec<(u32, f64)>,
+    /// What was refined, coarse to fine.
+    nodes: Vec<u32>,
+    /// The highest rank of that, 0 where there is none.
+    highest: f64,
     /// What would be refined too, were its children in memory, with ranks.
     lacking: Vec<(u32, f64)>,
 }
@@ -172,7 +173,7 @@ impl<'a> Refined<'a> {
         rests: &'a Rests<'a>,
     ) -> Self {
         let (nodes, lacking) = (Vec::new(), Vec::new());
-        Self { frame, is_hidden, rests, front: front.to_vec(), nodes, lacking }
+        Self { frame, is_hidden, rests, front: front.to_vec(), nodes, highest: 0.0, lacking }
     }
 
     /// Refines by rank what is not hidden until it takes so many milliseconds.
@@ -198,24 +199,20 @@ impl<'a> Refined<'a> {
                 self.lacking.push((node, rank));
                 continue;
             }
-            self.nodes.push((node, rank));
+            self.nodes.push(node);
+            self.highest = self.highest.max(rank);
             for child in visible_children(frame, node) {
                 self.front.push(child);
                 push(&mut upgrades, child);
             }
         }
-        let gone: BTreeSet<u32> = self.nodes.iter().map(|&(node, _)| node).collect();
+        let gone: BTreeSet<u32> = self.nodes.iter().copied().collect();
         self.front.retain(|node| !gone.contains(node));
-    }
-
-    /// The highest rank of what was refined, 0 where nothing was.
-    fn highest(&self) -> f64 {
-        self.nodes.iter().map(|&(_, rank)| rank).fold(0.0, f64::max)
     }
 
     /// Leaves the node as it was that was refined last.
     fn undo_last(&mut self) {
-        let Some((node, _)) = self.nodes.pop() else { return };
+        let Some(node) = self.nodes.pop() else { return };
         let children = self.frame.tree.children(node);
         self.front.retain(|at| !children.contains(at));
         self.front.push(node);
@@ -224,7 +221,13 @@ impl<'a> Refined<'a> {
 
 fn drawn_ms(frame: &FrameInput<'_>, front: &[u32], is_hidden: &dyn Fn(u32) -> bool) -> f64 {
     let drawn: Vec<u32> = front.iter().copied().filter(|&node| !is_hidden(node)).collect();
-    frame.costs.priced_ms(&FrontLoad::default().of(frame.tree, &drawn, frame.view, 0))
+    frame.costs.priced_ms(&FrontLoad::default().of(
+        frame.tree,
+        &drawn,
+        frame.view,
+        frame.covered,
+        0,
+    ))
 }
 
 /// Milliseconds of what is drawn of a front though, by the surfaces of the roots, it is not seen: what coarse

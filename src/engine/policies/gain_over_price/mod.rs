@@ -323,7 +323,11 @@ impl GainOverPrice {
     /// least rank of what is refined is `least`.
     fn lacking(&self, frame: &FrameInput<'_>, ms: f64, least: Option<f64>) -> u32 {
         let makes_way = |rank: f64| rank > least.unwrap_or(0.0) * self.options.hysteresis;
-        let fits = |node: u32| ms + refining_ms(frame, node) <= self.fill_ms;
+        // Which of its children are in view need not be found out where there is time for all of them.
+        let fits = |node: u32| {
+            let is_time_for = |more_ms: f64| ms + more_ms <= self.fill_ms;
+            is_time_for(wholly_refining_ms(frame, node)) || is_time_for(refining_ms(frame, node))
+        };
         let would_be_refined = |&node: &u32| {
             let rank = self.ranks[node as usize];
             rank > 0.0
@@ -331,7 +335,7 @@ impl GainOverPrice {
                 && !frame.can_refine(node)
                 && !frame.is_hidden(node)
                 && !self.levels.rests(node, rank, least)
-                && (fits(node) || makes_way(rank))
+                && (makes_way(rank) || fits(node))
         };
         let nodes = self.visited.iter().copied().filter(would_be_refined);
         nodes.map(|node| frame.missing_children(node)).sum()
