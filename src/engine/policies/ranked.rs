@@ -83,9 +83,18 @@ pub(super) fn count_culled(frame: &FrameInput<'_>, out: &mut Selection) {
     out.culled = culled.count() as u32;
 }
 
-/// Milliseconds of a frame that draws what of a front is not hidden.
+/// Milliseconds of a frame that draws what of a front is not hidden, as far as that is known.
 pub(super) fn front_ms(frame: &FrameInput<'_>, front: &[u32]) -> f64 {
-    let drawn: Vec<u32> = front.iter().copied().filter(|&node| !frame.is_hidden(node)).collect();
+    drawn_ms(frame, front, &|node| frame.is_hidden(node))
+}
+
+/// The same where this is hidden.
+pub(super) fn drawn_ms(
+    frame: &FrameInput<'_>,
+    front: &[u32],
+    is_hidden: &dyn Fn(u32) -> bool,
+) -> f64 {
+    let drawn: Vec<u32> = front.iter().copied().filter(|&node| !is_hidden(node)).collect();
     let load = FrontLoad::default().of(frame.tree, &drawn, frame.view, frame.covered, 0);
     frame.costs.priced_ms(&load)
 }

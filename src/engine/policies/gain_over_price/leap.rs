@@ -8,8 +8,10 @@ use std::collections::{BTreeSet, BinaryHeap};
 
 use super::gain::Gain;
 use super::levels::Levels;
-use crate::engine::policies::ranked::{Ranked, added_ms, visible_children, wholly_refining_ms};
-use crate::engine::{FrameInput, FrontLoad};
+use crate::engine::FrameInput;
+use crate::engine::policies::ranked::{
+    Ranked, added_ms, drawn_ms, visible_children, wholly_refining_ms,
+};
 
 /// It is tried so often, seconds.
 const EVERY_S: f64 = 0.25;
@@ -217,17 +219,6 @@ impl<'a> Refined<'a> {
         self.front.retain(|at| !children.contains(at));
         self.front.push(node);
     }
-}
-
-fn drawn_ms(frame: &FrameInput<'_>, front: &[u32], is_hidden: &dyn Fn(u32) -> bool) -> f64 {
-    let drawn: Vec<u32> = front.iter().copied().filter(|&node| !is_hidden(node)).collect();
-    frame.costs.priced_ms(&FrontLoad::default().of(
-        frame.tree,
-        &drawn,
-        frame.view,
-        frame.covered,
-        0,
-    ))
 }
 
 /// Milliseconds of what is drawn of a front though, by the surfaces of the roots, it is not seen: what coarse

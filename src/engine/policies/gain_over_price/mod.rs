@@ -21,7 +21,7 @@ use std::collections::BinaryHeap;
 
 use super::parameter::{Parameter, info, parameter, with_settings};
 use super::ranked::{
-    Ranked, count_culled, front_ms, refining_ms, visible_children, wholly_refining_ms,
+    Ranked, count_culled, drawn_ms, front_ms, refining_ms, visible_children, wholly_refining_ms,
 };
 use super::{PolicyKind, Settings};
 use crate::Result;
@@ -35,6 +35,9 @@ use worth::Worth;
 
 /// A frame is full from this part of its budget on.
 const FULL: f64 = 0.9;
+
+/// Where a front takes so many times its budget, it may be that what it hides is not known yet.
+const MUCH_LATE: f64 = 1.1;
 
 /// So often at most a front is summed up in a frame and relieved of what it takes too long.
 const MOST_ROUNDS: usize = 8;
@@ -221,9 +224,27 @@ impl GainOverPrice {
         self.worst(frame).map(|worst| self.ranks[worst as usize])
     }
 
+    /// Whether a frame is late, as far as is known.
+    fn is_late(&self, frame: &FrameInput<'_>, ms: f64) -> bool {
+        ms > frame.budget_ms * (1.0 + self.options.slack)
+    }
+
+    /// Whether a front is not late without what it hides itself. Where the camera turns to other parts of the
+    /// scene, or jumps, what was drawn before hides nothing of them.
+    fn hides_enough(&self, frame: &FrameInput<'_>, out: &mut Selection) -> bool {
+        let Some(hidden) = frame.hidden else { return false };
+        let behind = hidden.behind(frame.tree, &out.front, frame.view);
+        let is_hidden = |node: u32| behind.hides(node);
+        let hides_enough = drawn_ms(frame, &out.front, &is_hidden) <= frame.budget_ms;
+        if hides_enough {
+            out.counted_on.extend(out.front.iter().copied().filter(|&node| is_hidden(node)));
+        }
+        hides_enough
+    }
+
     /// Coarsens until a frame of `ms` milliseconds is not late.
     fn relieve(&mut self, frame: &FrameInput<'_>, mut ms: f64) -> f64 {
-        if ms > frame.budget_ms * (1.0 + self.options.slack) {
+        if self.is_late(frame, ms) {
             let mut is_back = false;
             while ms > frame.budget_ms {
                 let Some(node) = self.worst(frame) else { break };
@@ -393,8 +414,11 @@ impl Policy for GainOverPrice {
             }
         }
         self.front_into(out);
-        let ms = self.relieve(frame, front_ms(frame, &out.front));
-        let ms = self.refine(frame, ms);
+        let mut ms = front_ms(frame, &out.front);
+        if ms < MUCH_LATE * frame.budget_ms || !self.hides_enough(frame, out) {
+            ms = self.relieve(frame, ms);
+            ms = self.refine(frame, ms);
+        }
         // What rests is left out for good where there is no time to speak of.
         let is_full = ms > FULL * self.fill_ms;
         let mut is_done =
