@@ -351,6 +351,40 @@ fn what_hides_the_rest_is_refined_though_there_is_time_for_it_only_then() {
 }
 
 #[test]
+fn where_the_camera_jumps_to_what_hides_itself_nothing_is_relieved() {
+    // Near: 0 → 1, 2, of which 1 is a wall; behind it 3 → 4, 5.
+    let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), root(20.0, 0.01, 2)]));
+    frame.target_ms = 45.0;
+    let mut hidden = HiddenNodes::new(frame.tree.len(), 0.1);
+    let mut policy = policy(&[]);
+    let mut drawn = |frame: &TestFrame, hidden: &mut HiddenNodes| {
+        hidden.begin_frame(&frame.view, frame.dt_s);
+        let mut out = Selection::default();
+        policy.select(&FrameInput { hidden: Some(hidden), ..frame.input() }, &mut out);
+        hidden.count_on(&out.counted_on);
+        let mut drawn = hidden.drawn(&frame.tree, &out.front, &frame.view).to_vec();
+        drawn.sort_unstable();
+        drawn
+    };
+    let ahead = frame.view;
+    let mut pose = ahead.pose;
+    pose.position.x = 1000.0;
+    let away = View::new(pose, ahead.velocity, ahead.size);
+    assert_eq!(drawn(&frame, &mut hidden), [1, 2, 4, 5], "time for all, and no wall yet");
+    frame.view = away;
+    assert!(drawn(&frame, &mut hidden).is_empty());
+    hidden.set(1, Some(test_wall(10.5)));
+    (frame.view, frame.target_ms) = (ahead, 22.0);
+    for _ in 0..60 {
+        assert_eq!(drawn(&frame, &mut hidden), [1, 2], "the wall hides the rest");
+    }
+    frame.view = away;
+    assert!(drawn(&frame, &mut hidden).is_empty());
+    (frame.view, frame.target_ms) = (ahead, 19.0);
+    assert_eq!(drawn(&frame, &mut hidden), [0, 3], "there is no time for the wall");
+}
+
+#[test]
 fn time_is_not_left_over_because_children_hide_each_other_only_once_they_are_drawn() {
     // 0 → 1, a wall, and 2 behind it: 12, 10 and 15 ms. All of 0 is seen.
     let behind = Sketch { triangles: 15, ..sketch([21.0, 0.0, 0.0], 1.0, vec![]) };
