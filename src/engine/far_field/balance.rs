@@ -83,6 +83,11 @@ impl Picture {
 }
 
 impl Balance {
+    /// The hierarchy alone is in use, and given time: levels arrive.
+    pub fn new() -> Self {
+        Self { since_s: EVERY_S - SETTLES_S, ..Self::default() }
+    }
+
     /// Whether faces are to be drawn.
     pub fn uses_faces(&self) -> bool {
         self.use_faces
@@ -269,7 +274,8 @@ mod tests {
     /// Whether faces are wanted beside a front, where there is so much time.
     fn wants_faces(target_ms: f64, front: &[u32]) -> bool {
         let (frame, mut far_field) = (frame(target_ms), far_field());
-        assert!(!far_field.is_due(0.2, None) && far_field.is_due(0.1, None));
+        assert!(!far_field.is_due(SETTLES_S - 0.1, None), "levels arrive");
+        assert!(far_field.is_due(0.2, None));
         far_field.weigh(&frame.input(), front, 0.0);
         assert!(!far_field.is_due(0.2, None), "it has been weighed");
         far_field.is_wanted()

@@ -56,7 +56,7 @@ impl FarField {
         let balance = match mode {
             FarFieldMode::Off => return None,
             FarFieldMode::Cells => None,
-            FarFieldMode::Auto => Some(Balance::default()),
+            FarFieldMode::Auto => Some(Balance::new()),
         };
         let (shown, before) = (FarShown::default(), FarShown::default());
         Some(Self { cells, first, shown, before, balance })
