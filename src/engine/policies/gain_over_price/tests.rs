@@ -1,8 +1,8 @@
 use super::*;
 use crate::camera::{View, from_angles};
-use crate::engine::HiddenNodes;
 use crate::engine::occlusion::{seen_past, test_wall};
 use crate::engine::test_frame::{TestFrame, passes_over_what_is_not_in_memory, root};
+use crate::engine::{HiddenNodes, SeenAreas};
 use crate::mesh::UpAxis;
 use crate::random::Random;
 use crate::runtime::test_tree::{Sketch, sketch, tree};
@@ -313,6 +313,22 @@ fn is_below(frame: &TestFrame, mut node: u32, above: u32) -> bool {
     false
 }
 
+/// What of the front that is chosen is drawn, sorted.
+fn drawn(
+    policy: &mut dyn Policy,
+    frame: &TestFrame,
+    seen: Option<&SeenAreas>,
+    hidden: &mut HiddenNodes,
+) -> Vec<u32> {
+    hidden.begin_frame(&frame.view, frame.dt_s);
+    let mut out = Selection::default();
+    policy.select(&FrameInput { hidden: Some(hidden), seen, ..frame.input() }, &mut out);
+    hidden.count_on(&out.counted_on);
+    let mut drawn = hidden.drawn(&frame.tree, &out.front, &frame.view).to_vec();
+    drawn.sort_unstable();
+    drawn
+}
+
 #[test]
 fn what_hides_the_rest_is_refined_though_there_is_time_for_it_only_then() {
     // Near: 0 → 1, 2, which are a wall where 0 is not; behind it: 3 → 4, 5 and 6 → 7, 8.
@@ -323,17 +339,7 @@ fn what_hides_the_rest_is_refined_though_there_is_time_for_it_only_then() {
     hidden.set(1, Some(test_wall(10.5)));
     let run = |frame: &TestFrame, hidden: &mut HiddenNodes, frames: usize| {
         let mut policy = policy(&[]);
-        let mut fronts = Vec::new();
-        for _ in 0..frames {
-            hidden.begin_frame(&frame.view, frame.dt_s);
-            let mut out = Selection::default();
-            policy.select(&FrameInput { hidden: Some(hidden), ..frame.input() }, &mut out);
-            hidden.count_on(&out.counted_on);
-            let mut drawn = hidden.drawn(&frame.tree, &out.front, &frame.view).to_vec();
-            drawn.sort_unstable();
-            fronts.push(drawn);
-        }
-        fronts
+        (0..frames).map(|_| drawn(&mut *policy, frame, None, hidden)).collect::<Vec<_>>()
     };
     let fronts = run(&frame, &mut hidden, 60);
     let leapt = fronts.iter().position(|front| *front != [0, 3, 6]).unwrap();
@@ -357,15 +363,8 @@ fn where_the_camera_jumps_to_what_hides_itself_nothing_is_relieved() {
     frame.target_ms = 45.0;
     let mut hidden = HiddenNodes::new(frame.tree.len(), 0.1);
     let mut policy = policy(&[]);
-    let mut drawn = |frame: &TestFrame, hidden: &mut HiddenNodes| {
-        hidden.begin_frame(&frame.view, frame.dt_s);
-        let mut out = Selection::default();
-        policy.select(&FrameInput { hidden: Some(hidden), ..frame.input() }, &mut out);
-        hidden.count_on(&out.counted_on);
-        let mut drawn = hidden.drawn(&frame.tree, &out.front, &frame.view).to_vec();
-        drawn.sort_unstable();
-        drawn
-    };
+    let mut drawn =
+        |frame: &TestFrame, hidden: &mut HiddenNodes| drawn(&mut *policy, frame, None, hidden);
     let ahead = frame.view;
     let mut pose = ahead.pose;
     pose.position.x = 1000.0;
@@ -395,17 +394,7 @@ fn time_is_not_left_over_because_children_hide_each_other_only_once_they_are_dra
     let mut hidden = HiddenNodes::new(frame.tree.len(), 0.1);
     let mut policy = policy(&[]);
     let mut last = |frame: &TestFrame, hidden: &mut HiddenNodes, frames: usize| {
-        let mut drawn = Vec::new();
-        for _ in 0..frames {
-            hidden.begin_frame(&frame.view, frame.dt_s);
-            let mut out = Selection::default();
-            let input = FrameInput { hidden: Some(hidden), seen: Some(&seen), ..frame.input() };
-            policy.select(&input, &mut out);
-            hidden.count_on(&out.counted_on);
-            drawn = hidden.drawn(&frame.tree, &out.front, &frame.view).to_vec();
-        }
-        drawn.sort_unstable();
-        drawn
+        (0..frames).map(|_| drawn(&mut *policy, frame, Some(&seen), hidden)).last().unwrap()
     };
     frame.target_ms = 30.0;
     assert_eq!(last(&frame, &mut hidden, 30), [1, 2], "there is time for both");
