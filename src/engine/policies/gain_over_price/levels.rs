@@ -48,6 +48,15 @@ struct Level {
     was_still: bool,
 }
 
+/// Why a node is coarsened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cause {
+    /// Its frame would be late.
+    Late,
+    /// What ranks higher needs its time.
+    MakesWay,
+}
+
 const UNTOUCHED: Level = Level {
     is_refined: false,
     changed_s: f64::NEG_INFINITY,
@@ -83,11 +92,10 @@ impl Levels {
     pub fn begin_frame(&mut self, frame: &FrameInput<'_>, options: &Options) {
         self.nodes.resize(frame.tree.len(), UNTOUCHED);
         self.now_s += frame.dt_s;
-        let before = self.pose.replace(frame.view.pose);
-        if before != Some(frame.view.pose) {
-            self.moved_s = self.now_s;
-        }
-        if let Some(before) = before {
+        if let Some(before) = self.pose.replace(frame.view.pose) {
+            if before != frame.view.pose {
+                self.moved_s = self.now_s;
+            }
             self.sway.go(&before, &frame.view.pose, frame.dt_s);
         }
         self.have_changed = false;
@@ -149,11 +157,13 @@ impl Levels {
     }
 
     /// It stands for itself again, at a rank. Whether it had been refined of late, and seen so.
-    pub fn coarsen(&mut self, node: u32, rank: f64, options: &Options) -> bool {
+    pub fn coarsen(&mut self, node: u32, rank: f64, cause: Cause, options: &Options) -> bool {
         self.have_changed = true;
         let (was_still, sways) = (self.is_still(), self.sways());
         let level = &mut self.nodes[node as usize];
-        let is_to_blame = self.slow_s.is_none_or(|slow_s| self.now_s - slow_s > AFTER_SLOW_S);
+        let is_slow = self.slow_s.is_some_and(|slow_s| self.now_s - slow_s <= AFTER_SLOW_S);
+        // Before a camera that stands only what has arrived ranks higher, and that happens once.
+        let is_to_blame = !is_slow && !(was_still && cause == Cause::MakesWay);
         let is_back = is_to_blame && self.now_s - level.changed_s < BACK_WITHIN_S;
         // What was refined in this very frame was never seen so; in a sway it rests as it did.
         let was_seen = level.changed_s < self.now_s;
@@ -241,10 +251,14 @@ mod tests {
         }
 
         /// Refines the node, and coarsens it after some seconds at a rank of 1.
-        fn refine_for(&mut self, seconds: u32) -> bool {
+        fn refine_until(&mut self, seconds: u32, cause: Cause) -> bool {
             self.levels.refine(0);
             self.pass(seconds);
-            self.levels.coarsen(0, 1.0, &self.options)
+            self.levels.coarsen(0, 1.0, cause, &self.options)
+        }
+
+        fn refine_for(&mut self, seconds: u32) -> bool {
+            self.refine_until(seconds, Cause::Late)
         }
 
         /// Seconds until it rests no longer.
@@ -270,6 +284,21 @@ mod tests {
         assert_eq!(swaying.rests_s(rests_long), 600);
         assert!(!swaying.refine_for(20), "not soon");
         assert_eq!(swaying.rests_s(rests_long), 0);
+    }
+
+    /// Only what has arrived can rank higher there, and it does so once.
+    #[test]
+    fn what_makes_way_before_a_camera_that_stands_is_not_to_blame() {
+        let mut swaying = Swaying::new();
+        let rests = |levels: &Levels| levels.rests(0, 1.0, Some(1.0));
+        assert!(swaying.refine_until(5, Cause::MakesWay), "it moves");
+        assert_eq!(swaying.rests_s(rests), 16);
+        swaying.stands = true;
+        swaying.pass(2);
+        assert!(!swaying.refine_until(5, Cause::MakesWay));
+        assert_eq!(swaying.rests_s(rests), 1, "as long as all that has changed");
+        assert!(swaying.refine_until(5, Cause::Late));
+        assert_eq!(swaying.rests_s(rests), 16);
     }
 
     #[test]

@@ -30,7 +30,7 @@ use ahead::Ahead;
 use gain::Gain;
 pub(in crate::engine) use gain::{part_of_picture, removed};
 use leap::{Leap, Rests};
-use levels::Levels;
+use levels::{Cause, Levels};
 use worth::Worth;
 
 /// A frame is full from this part of its budget on.
@@ -200,8 +200,8 @@ impl GainOverPrice {
     }
 
     /// Whether it had been refined of late, and seen so.
-    fn downgrade(&mut self, frame: &FrameInput<'_>, node: u32) -> bool {
-        let is_back = self.levels.coarsen(node, self.ranks[node as usize], &self.options);
+    fn downgrade(&mut self, frame: &FrameInput<'_>, node: u32, cause: Cause) -> bool {
+        let is_back = self.levels.coarsen(node, self.ranks[node as usize], cause, &self.options);
         if let Some(parent) = frame.tree.node(node).parent {
             self.push_downgrade(frame, parent);
         }
@@ -249,7 +249,7 @@ impl GainOverPrice {
             while ms > frame.budget_ms {
                 let Some(node) = self.worst(frame) else { break };
                 ms -= refining_ms(frame, node);
-                is_back |= self.downgrade(frame, node);
+                is_back |= self.downgrade(frame, node, Cause::Late);
             }
             if is_back {
                 self.levels.take_back();
@@ -313,7 +313,7 @@ impl GainOverPrice {
         let is_enough = freed_ms >= over_ms;
         for &node in &way {
             match is_enough {
-                true => _ = self.downgrade(frame, node),
+                true => _ = self.downgrade(frame, node, Cause::MakesWay),
                 false => self.push_downgrade(frame, node),
             }
         }
