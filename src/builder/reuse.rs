@@ -11,6 +11,7 @@ use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::hierarchy::Tree;
 use crate::builder::options::same_nodes;
 use crate::format::attributes::Attributes;
+use crate::format::rims::Rims;
 use crate::format::{NODES_DIR, OutputDir, REPORT_FILE, Scene, SharedTexture, TEXTURES_DIR};
 use crate::mesh::Warnings;
 use crate::report::build_report::{BuildReport, DistrictReport, FileReport, InputReport};
@@ -112,16 +113,19 @@ impl Earlier {
         Ok(())
     }
 
+    /// The rims of its districts; none where it has none that can be read, and all are found out again.
+    pub fn rims(&self) -> Rims {
+        Rims::read(&self.dir).ok().flatten().unwrap_or_default()
+    }
+
     /// Links the file of a district into the new output, where it is made of what it was made of then.
     pub fn take_over_district(
         &self,
-        file: &str,
-        made_of: &str,
+        district: &DistrictReport,
         output: &OutputDir,
     ) -> Result<Option<(NodeRecord, BTreeMap<String, SharedTexture>)>> {
-        let is_same = |known: &&DistrictReport| known.file == file && known.made_of == made_of;
-        let known = self.report.districts.iter().any(|known| is_same(&known));
-        let node = self.scene.nodes.iter().position(|node| node.file == file);
+        let known = self.report.districts.contains(district);
+        let node = self.scene.nodes.iter().position(|node| node.file == district.file);
         let Some(index) = node.filter(|_| known) else { return Ok(None) };
         let mut taken = Taken { blocks: Vec::new(), shared_textures: BTreeMap::new() };
         let record = self.record(index as u32, output, &mut taken)?;

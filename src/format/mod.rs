@@ -7,6 +7,7 @@
 //! out/tileset.json    the same for viewers that read 3D Tiles
 //! out/tilesets/*      regions of it, where the city is large
 //! out/build.json      what the build did, for people and scripts
+//! out/rims.hlod       where districts end, for the next build: Rims
 //! out/cells.hlod      cells in which viewers are, where such were prepared: Cells
 //! out/cells/*.glb     what is far from each of them, as pictures with depth
 //! ```
@@ -29,6 +30,7 @@ mod output_dir;
 #[cfg(test)]
 mod output_dir_tests;
 mod quantized;
+pub mod rims;
 mod scene;
 mod scene_check;
 mod scene_read;

@@ -15,6 +15,7 @@ use super::{
     BOXES_DIR, NODES_DIR, REPORT_FILE, SCENE_FILE, SCENE_MAGIC, SUBSETS_DIR, TEXTURES_DIR,
     TILESET_FILE, TILESETS_DIR,
     cells::{CELLS_DIR, CELLS_FILE},
+    rims::RIMS_FILE,
 };
 use crate::builder::Subset;
 use crate::{Error, Result};
@@ -307,7 +308,7 @@ fn sorted_names(listing: fs::ReadDir) -> io::Result<Vec<OsString>> {
 fn first_foreign(target: &Path, names: &[OsString]) -> Option<PathBuf> {
     for name in names {
         let kinds: &[&str] = match name.to_str() {
-            Some(SCENE_FILE | REPORT_FILE | TILESET_FILE | CELLS_FILE) => continue,
+            Some(SCENE_FILE | REPORT_FILE | TILESET_FILE | RIMS_FILE | CELLS_FILE) => continue,
             Some(NODES_DIR | CELLS_DIR) => &["glb"],
             Some(TEXTURES_DIR) => &["jpg", "png"],
             Some(TILESETS_DIR) => &["json"],

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 use crate::support::inputs::{SQUARE, small_city, write_city, write_street};
 use crate::support::result::{difference, lasting, report};
-use crate::support::{build_with, run_build};
+use crate::support::{build_with, hlod_build, run_build};
 
 const SMALL: [&str; 2] = ["--desired-tris", "250"];
 
@@ -155,15 +155,7 @@ fn what_changes_is_what_stands_above_what_changed() {
     let crcs = |scene: &Scene| -> BTreeMap<String, u32> {
         scene.nodes.iter().map(|node| (node.file.clone(), node.file_crc)).collect()
     };
-    // A building more in the middle of one part, at no border.
-    let changed = folder.path().join("parts/block_0007.obj");
-    let text = fs::read_to_string(&changed).unwrap();
-    let [low, high] = bounds(&text);
-    let at = [0, 1].map(|axis| (low[axis] + high[axis]) / 2.0);
-    let corner = |[x, y, z]: [f64; 3]| format!("v {} {} {}\n", at[0] + x, at[1] + y, high[2] + z);
-    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 9.0]].map(corner);
-    let more = format!("{text}\n{}f -4 -3 -2\nf -4 -3 -1\nf -3 -2 -1\n", corners.concat());
-    fs::write(&changed, more).unwrap();
+    add_building(&folder.path().join("parts/block_0007.obj"));
     build();
     let after = scene(&out);
     let (was, is) = (crcs(&before), crcs(&after));
@@ -182,6 +174,71 @@ fn what_changes_is_what_stands_above_what_changed() {
     let mut clean = lasting(&folder.path().join("clean"));
     clean.remove("build.json");
     assert_eq!(difference(&clean, &result), None);
+}
+
+/// Neither for themselves nor for where they meet what has changed.
+#[test]
+fn what_stands_apart_from_what_changed_is_not_read_again() {
+    let folder = parts();
+    let out = folder.path().join("out");
+    let build = || run_build(folder.path(), &[&SMALL[..], &["parts", "out"]].concat());
+    build();
+    let before = scene(&out);
+    let is_changed = |&block: &u32| before.blocks[block as usize].input.contains("0007");
+    let apart: Vec<u32> = before
+        .roots()
+        .filter(|&root| !blocks_below(&before, root).iter().any(is_changed))
+        .collect();
+    assert!(apart.len() + 1 == roots(&before) && apart.len() >= 3, "{apart:?}");
+    let mut all = apart.clone();
+    while let Some(node) = all.pop() {
+        let file = out.join("nodes").join(&before.nodes[node as usize].file);
+        fs::write(&file, vec![0; fs::metadata(&file).unwrap().len() as usize]).unwrap();
+        all.extend(before.children(node));
+    }
+    let changed = folder.path().join("parts/block_0007.obj");
+    lift_vertex(&changed);
+    build();
+    let after = scene(&out);
+    let is_as_before = |&root: &u32| {
+        let was = &before.nodes[root as usize];
+        after.nodes.iter().any(|node| (&node.file, node.file_crc) == (&was.file, was.file_crc))
+    };
+    assert!(apart.iter().all(is_as_before));
+    assert_ne!(after.fingerprint, before.fingerprint);
+    // Without what is known of where they end, all are.
+    fs::remove_file(out.join("rims.hlod")).unwrap();
+    lift_vertex(&changed);
+    hlod_build().current_dir(folder.path()).args(SMALL).args(["parts", "out"]).assert().failure();
+}
+
+/// Lifts a vertex half way up and nearest to the middle of a model, which stays in its box.
+fn lift_vertex(obj: &Path) {
+    let text = fs::read_to_string(obj).unwrap();
+    let [low, high] = bounds(&text);
+    let middle: [f64; 3] = std::array::from_fn(|axis| (low[axis] + high[axis]) / 2.0);
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let at = |line: &str| -> Option<[f64; 3]> {
+        let mut numbers = line.strip_prefix("v ")?.split_whitespace().map(|at| at.parse().ok());
+        Some([numbers.next()??, numbers.next()??, numbers.next()??])
+    };
+    let off = |at: [f64; 3]| (0..3).map(|axis| (at[axis] - middle[axis]).abs()).sum::<f64>();
+    let vertices = (0..lines.len()).filter_map(|line| Some((line, at(&lines[line])?)));
+    let nearest = vertices.min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+    let (line, [x, y, z]) = nearest.unwrap();
+    lines[line] = format!("v {x} {y} {}", z + 0.05);
+    fs::write(obj, lines.join("\n")).unwrap();
+}
+
+/// One more in the middle of a model, at no border.
+fn add_building(obj: &Path) {
+    let text = fs::read_to_string(obj).unwrap();
+    let [low, high] = bounds(&text);
+    let at = [0, 1].map(|axis| (low[axis] + high[axis]) / 2.0);
+    let corner = |[x, y, z]: [f64; 3]| format!("v {} {} {}\n", at[0] + x, at[1] + y, high[2] + z);
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 9.0]].map(corner);
+    let more = format!("{text}\n{}f -4 -3 -2\nf -4 -3 -1\nf -3 -2 -1\n", corners.concat());
+    fs::write(obj, more).unwrap();
 }
 
 fn bounds(obj: &str) -> [[f64; 3]; 2] {

@@ -16,6 +16,11 @@ use crate::mesh::{PositionKey, key};
 /// A box of source coordinates: least and greatest corner.
 pub type Bounds = ([f64; 3], [f64; 3]);
 
+/// Whether a position is in a box, or on its sides.
+pub fn holds((low, high): &Bounds, at: &[f64; 3]) -> bool {
+    (0..3).all(|axis| low[axis] <= at[axis] && at[axis] <= high[axis])
+}
+
 /// The box of some positions; inside out where there are none.
 pub fn bounds_of(positions: impl Iterator<Item = [f64; 3]>) -> Bounds {
     let empty = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -48,8 +53,6 @@ pub fn each_shared<P>(
     P: Iterator<Item = [f64; 3]>,
 {
     let meet = |a: &Bounds, b: &Bounds| (0..3).all(|i| a.0[i] <= b.1[i] && b.0[i] <= a.1[i]);
-    let holds =
-        |bounds: &Bounds, p: &[f64; 3]| (0..3).all(|i| bounds.0[i] <= p[i] && p[i] <= bounds.1[i]);
     // The first block that uses a position, and the last.
     let mut users: FxHashMap<PositionKey<f64>, [u32; 2]> = FxHashMap::default();
     for (number, bounds) in blocks.iter().enumerate() {

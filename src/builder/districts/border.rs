@@ -11,13 +11,16 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use blake3::Hasher;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::builder::border::chain::{BorderVertex, CutPlane, KeepRule};
 use crate::builder::border::rank::SurfaceQuadric;
-use crate::builder::border::shared::{Bounds, bounds_of, mark_border, shared_positions};
+use crate::builder::border::shared::{Bounds, bounds_of, holds, mark_border, shared_positions};
 use crate::builder::cut::split::Chunk;
 use crate::builder::districts::cuts::{Cuts, PlaneKey};
+use crate::builder::districts::made_of::{Hash, update};
+use crate::format::rims::{KnownRim, Rim};
 use crate::mesh::{DisjointSet, Mesh, PositionKey, key, wide};
 
 /// A district has at most so many planes around it; at what is beyond them nothing thins.
@@ -28,11 +31,18 @@ type EdgeKey = [PositionKey<f64>; 2];
 /// The borders between the districts of a level.
 #[derive(Debug, Default)]
 pub struct LevelBorder {
-    planes: BTreeMap<PlaneKey, Arc<CutPlane<f64>>>,
+    planes: BTreeMap<PlaneKey, RankedPlane>,
     /// Vertices that stay.
     kept: FxHashSet<PositionKey<f64>>,
     /// The vertices of the planes.
     on_planes: FxHashSet<PositionKey<f64>>,
+}
+
+/// A plane, and a hash of what is kept along it.
+#[derive(Debug)]
+struct RankedPlane {
+    plane: Arc<CutPlane<f64>>,
+    hash: Hash,
 }
 
 /// The border vertices of a plane, numbered, and their edges.
@@ -53,49 +63,32 @@ impl PlaneEdges {
     }
 }
 
-/// What the borders of a district depend on: its surface where it ends, and where others are.
-#[derive(Clone, Debug)]
-pub struct Rim {
-    bounds: Bounds,
-    /// Vertices that others may have, too.
-    positions: Vec<[f64; 3]>,
-    /// Edges at which it ends: those in planes of cuts, and where others may be.
-    open: Vec<[[f64; 3]; 2]>,
-    /// Corners of the triangles at the ends of those in planes.
-    triangles: Vec<[[f64; 3]; 3]>,
-}
-
-impl Rim {
-    /// Of a district whose members are this surface; no other is out of the boxes of `others`. `cuts` are the
-    /// planes that divided their blocks.
-    pub fn new(mesh: &Mesh<f64>, cuts: &Cuts, others: &[Bounds]) -> Self {
-        let is_in = |at: &[f64; 3], bounds: &Bounds| {
-            (0..3).all(|axis| bounds.0[axis] <= at[axis] && at[axis] <= bounds.1[axis])
-        };
-        let is_of_others = |at: &&[f64; 3]| others.iter().any(|bounds| is_in(at, bounds));
-        let is_in_plane = |ends: &[[f64; 3]; 2]| {
-            cuts.of(ends).next().is_some() || cuts.along(ends).next().is_some()
-        };
-        let mut open = open_edges(mesh, cuts);
-        open.retain(|ends| is_in_plane(ends) || ends.iter().all(|end| is_of_others(&end)));
-        let in_planes = open.iter().filter(|ends| is_in_plane(ends)).flatten();
-        let ends: FxHashSet<PositionKey<f64>> = in_planes.map(|end| key(*end)).collect();
-        let corners = mesh.triangles.iter();
-        let corners = corners.map(|corners| corners.map(|at| mesh.positions[at as usize]));
-        let is_at_end = |corners: &[[f64; 3]; 3]| corners.iter().any(|at| ends.contains(&key(*at)));
-        Self {
-            bounds: bounds_of(mesh.positions.iter().copied()),
-            positions: mesh.positions.iter().filter(is_of_others).copied().collect(),
-            triangles: corners.filter(is_at_end).collect(),
-            open,
-        }
+/// The rim of a district whose members are this surface; no other is out of the boxes of `others`. `cuts` are the
+/// planes that divided their blocks.
+pub fn rim_of(mesh: &Mesh<f64>, cuts: &Cuts, others: &[Bounds]) -> Rim {
+    let is_of_others = |at: &&[f64; 3]| others.iter().any(|bounds| holds(bounds, at));
+    let is_in_plane =
+        |ends: &[[f64; 3]; 2]| cuts.of(ends).next().is_some() || cuts.along(ends).next().is_some();
+    let mut open = open_edges(mesh, cuts);
+    open.retain(|ends| is_in_plane(ends) || ends.iter().all(|end| is_of_others(&end)));
+    let in_planes = open.iter().filter(|ends| is_in_plane(ends)).flatten();
+    let ends: FxHashSet<PositionKey<f64>> = in_planes.map(|end| key(*end)).collect();
+    let corners = mesh.triangles.iter();
+    let corners = corners.map(|corners| corners.map(|at| mesh.positions[at as usize]));
+    let is_at_end = |corners: &[[f64; 3]; 3]| corners.iter().any(|at| ends.contains(&key(*at)));
+    Rim {
+        bounds: bounds_of(mesh.positions.iter().copied()),
+        positions: mesh.positions.iter().filter(is_of_others).copied().collect(),
+        triangles: corners.filter(is_at_end).collect(),
+        open,
     }
 }
 
 impl LevelBorder {
     /// Between districts of which these are the rims, of which `rule` says what is kept. `cuts` are the
     /// planes that divided their blocks.
-    pub fn between(districts: &[Rim], cuts: &Cuts, rule: &KeepRule) -> Self {
+    pub fn between(districts: &[KnownRim], cuts: &Cuts, rule: &KeepRule) -> Self {
+        let districts: Vec<&Rim> = districts.iter().map(|known| &known.rim).collect();
         let bounds: Vec<Bounds> = districts.iter().map(|rim| rim.bounds).collect();
         let positions = |district: usize| districts[district].positions.iter().copied();
         let shared = shared_positions(&bounds, positions);
@@ -143,7 +136,7 @@ impl LevelBorder {
             *on_planes.entry(key(vertex)).or_default() += 1;
         }
         kept.extend(shared.iter().filter(|position| !on_planes.contains_key(position)));
-        let surfaces = surfaces(districts, &on_planes);
+        let surfaces = surfaces(&districts, &on_planes);
         let ranked = |plane: PlaneEdges, (axis, bits): PlaneKey| {
             let coordinate = f64::from_bits(bits);
             let rounding = 2.0 * rule.collinear.max(0.0);
@@ -155,7 +148,7 @@ impl LevelBorder {
                 BorderVertex { position, fixed, surface: surfaces[&at] }
             };
             let vertices: Vec<_> = plane.vertices.iter().map(vertex).collect();
-            Arc::new(CutPlane::new(axis, coordinate, &vertices, &plane.edges, rule))
+            RankedPlane::new(CutPlane::new(axis, coordinate, &vertices, &plane.edges, rule))
         };
         let planes = planes
             .into_iter()
@@ -173,7 +166,41 @@ impl LevelBorder {
 
     /// Gives a district its part of the borders.
     pub fn mark(&self, chunk: &mut Chunk<f64>) {
-        mark_border(chunk, self.planes.values(), &self.kept, MOST_PLANES);
+        let planes = self.planes.values().map(|ranked| &ranked.plane);
+        mark_border(chunk, planes, &self.kept, MOST_PLANES);
+    }
+
+    /// Adds to a hash all that it says of the district that has this rim.
+    pub fn hash(&self, rim: &Rim, hasher: &mut Hasher) {
+        let ends = rim.positions.iter().chain(rim.open.as_flattened());
+        let mut borders: Vec<[f64; 3]> = ends.copied().filter(|&at| self.has(at)).collect();
+        borders.sort_unstable_by_key(|&at| key(at));
+        borders.dedup();
+        for position in &borders {
+            position.iter().for_each(|at| update(hasher, *at));
+            let at = key(*position);
+            let of = [self.kept.contains(&at), self.on_planes.contains(&at)];
+            hasher.update(&of.map(u8::from));
+        }
+        for RankedPlane { plane, hash } in self.planes.values() {
+            if borders.iter().any(|&position| plane.keep_level(position).is_some()) {
+                hasher.update(hash);
+            }
+        }
+    }
+}
+
+impl RankedPlane {
+    fn new(plane: CutPlane<f64>) -> Self {
+        let mut hasher = Hasher::new();
+        hasher.update(&[plane.axis as u8]);
+        update(&mut hasher, plane.coordinate);
+        for chain in &plane.chains {
+            hasher.update(&(chain.keep.len() as u64).to_le_bytes());
+            chain.positions.as_flattened().iter().for_each(|at| update(&mut hasher, *at));
+            hasher.update(&chain.keep);
+        }
+        Self { plane: Arc::new(plane), hash: hasher.finalize().into() }
     }
 }
 
@@ -260,7 +287,7 @@ fn lids(mesh: &Mesh<f64>, cuts: &Cuts) -> Vec<bool> {
 
 /// The surfaces around vertices, on all sides.
 fn surfaces(
-    districts: &[Rim],
+    districts: &[&Rim],
     vertices: &FxHashMap<PositionKey<f64>, u32>,
 ) -> FxHashMap<PositionKey<f64>, SurfaceQuadric> {
     let mut surfaces: FxHashMap<PositionKey<f64>, SurfaceQuadric> =
@@ -325,7 +352,11 @@ mod tests {
     fn between(meshes: &[&Mesh<f64>]) -> LevelBorder {
         let cuts = Cuts::new(&CUTS);
         let anywhere = ([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
-        let rims: Vec<Rim> = meshes.iter().map(|mesh| Rim::new(mesh, &cuts, &[anywhere])).collect();
+        let known = |mesh: &&Mesh<f64>| KnownRim {
+            rim: rim_of(mesh, &cuts, &[anywhere]),
+            ..KnownRim::default()
+        };
+        let rims: Vec<KnownRim> = meshes.iter().map(known).collect();
         LevelBorder::between(&rims, &cuts, &rule())
     }
 
@@ -428,7 +459,7 @@ mod tests {
             borders
                 .planes
                 .values()
-                .flat_map(|plane| plane.chains.iter())
+                .flat_map(|plane| plane.plane.chains.iter())
                 .map(|chain| chain.positions.len())
                 .sum::<usize>()
         };
@@ -436,6 +467,46 @@ mod tests {
         assert!(open >= 5);
         assert_eq!(border(true, true), open);
         assert_eq!(border(true, false), open);
+    }
+
+    /// What is hashed of a district's borders is what it is given of them.
+    #[test]
+    fn the_hash_of_borders_says_what_a_district_has_of_them() {
+        let across = (ACROSS - 1) as f64;
+        let lows = [[0.0, 0.0], [across, 0.0], [0.0, across], [across, across]];
+        let cuts = Cuts::new(&CUTS);
+        let anywhere = ([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
+        let of = |height: &dyn Fn(f64, f64) -> f64| -> Vec<(blake3::Hash, Chunk<f64>)> {
+            let meshes = lows.map(|low| field(low, height));
+            let borders = between(&meshes.each_ref());
+            let hash = |mesh: &Mesh<f64>| {
+                let mut hasher = Hasher::new();
+                borders.hash(&rim_of(mesh, &cuts, &[anywhere]), &mut hasher);
+                (hasher.finalize(), chunk(mesh, &borders))
+            };
+            meshes.iter().map(hash).collect()
+        };
+        let is = of(&hills);
+        // Higher where the last meets the second, or the third, or within it.
+        for at in [[24.0, 16.0], [16.0, 24.0], [24.0, 24.0]] {
+            let near = |x: f64, y: f64| (x - at[0]).abs() + (y - at[1]).abs() < 0.5;
+            let now = of(&|x, y| if near(x, y) { 2.0 } else { hills(x, y) });
+            for (number, (was, is)) in is.iter().zip(&now).enumerate() {
+                let given = |(_, chunk): &(blake3::Hash, Chunk<f64>)| {
+                    let planes = (0..chunk.path.len() as u32).map(|bit| {
+                        let plane = chunk.path.plane(bit);
+                        let chains = plane.chains.iter();
+                        let kept =
+                            chains.map(|chain| (chain.positions.clone(), chain.keep.clone()));
+                        (plane.axis, kept.collect::<Vec<_>>())
+                    });
+                    (chunk.border.keep.clone(), planes.collect::<Vec<_>>())
+                };
+                assert_eq!(was.0 == is.0, given(was) == given(is), "{at:?} {number}");
+            }
+            let changed = is.iter().zip(&now).filter(|(was, is)| was.0 != is.0).count();
+            assert_eq!(changed > 0, at != [24.0, 24.0], "{at:?}");
+        }
     }
 
     #[test]

@@ -4,6 +4,11 @@
 //! from which an edge would have been cut into slivers, and ends of edges along an earlier cut, which
 //! no later one divides.
 
+use blake3::Hasher;
+
+use super::made_of::update;
+use crate::builder::border::shared::Bounds;
+
 /// What reaches no farther from a plane than this share of its extent is in it.
 const CLOSE: f64 = 0.02;
 
@@ -45,6 +50,16 @@ impl Cuts {
             is_in_plane(ends, axis, coordinate) || farther.is_some_and(on_another)
         };
         self.within(ends, [CLOSE, ALONG]).filter(is_along)
+    }
+
+    /// Adds to a hash all planes that anything within bounds may be in or along.
+    pub fn hash(&self, (low, high): &Bounds, hasher: &mut Hasher) {
+        for (axis, all) in self.across.iter().enumerate() {
+            let first = all.partition_point(|at| *at < low[axis]).saturating_sub(1);
+            let behind = all.partition_point(|at| *at <= high[axis]) + 1;
+            hasher.update(b"across");
+            all[first..behind.min(all.len())].iter().for_each(|at| update(hasher, *at));
+        }
     }
 
     fn within(

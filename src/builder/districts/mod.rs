@@ -14,6 +14,8 @@ pub mod border;
 pub mod cuts;
 pub mod detail;
 pub mod grouping;
+mod made_of;
+mod meeting;
 pub mod members;
 pub mod near;
 mod polygon;
@@ -23,10 +25,10 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use self::border::{LevelBorder, Rim};
-use self::cuts::Cuts;
+use self::border::LevelBorder;
 use self::detail::{FileDetail, Files};
 use self::grouping::{Item, groups};
+use self::meeting::{Meeting, Planned};
 use self::members::Members;
 use self::near::Joined;
 use crate::Result;
@@ -46,9 +48,10 @@ use crate::builder::reuse::Earlier;
 use crate::builder::stages::{Stage, Stages};
 use crate::builder::stitch::{OpenEdge, stitches};
 use crate::builder::threads::in_parallel;
+use crate::format::rims::{KnownRim, RIMS_FILE, Rims};
 use crate::format::{OutputDir, SharedTexture};
 use crate::lattice::Lattice;
-use crate::mesh::{Coordinate, Model, NEAR, UpAxis, Warnings};
+use crate::mesh::{Model, NEAR, UpAxis, Warnings};
 use crate::report::build_report::{BlockCut, DistrictReport};
 use crate::texture::{SharedTextures, TextureCache};
 
@@ -103,6 +106,8 @@ pub fn build_districts(
 ) -> Result<Districts> {
     let &Above { options, out, stages, progress, earlier, up, cuts, meet } = above;
     let mut districts = Districts::default();
+    let known = earlier.map(Earlier::rims).unwrap_or_default();
+    let mut rims = Rims::default();
     let mut cuts: Vec<(usize, f64)> = cuts.iter().map(|cut| (cut.axis, cut.coordinate)).collect();
     for number in 0..MOST_LEVELS {
         if trees.len() <= MOST_ROOTS {
@@ -112,8 +117,12 @@ pub fn build_districts(
         let shared = SharedTextures::new();
         let target = Target { options, out, shared: &shared, stages, progress };
         let reused;
-        (trees, reused) =
-            Level { up, meet, target, earlier, number }.build(trees, &mut cuts, &mut districts)?;
+        (trees, reused) = Level { up, meet, target, earlier, known: &known, number }.build(
+            trees,
+            &mut cuts,
+            &mut rims,
+            &mut districts,
+        )?;
         if let Some(earlier) = earlier {
             earlier.link_textures(reused.keys(), out)?;
         }
@@ -123,6 +132,9 @@ pub fn build_districts(
         if trees.len() == before {
             break;
         }
+    }
+    if !rims.0.is_empty() {
+        out.write(RIMS_FILE, &rims.to_bytes()?)?;
     }
     sort(&mut trees);
     districts.reports.sort_by(|a, b| a.file.cmp(&b.file));
@@ -136,6 +148,8 @@ struct Level<'a> {
     meet: bool,
     target: Target<'a>,
     earlier: Option<&'a Earlier>,
+    /// The rims of that.
+    known: &'a Rims,
     /// From 0 upward.
     number: usize,
 }
@@ -158,11 +172,12 @@ struct Made {
 
 impl Level<'_> {
     /// Of trees, and the planes that divided what they stand for, as their nodes have them; these are as the
-    /// level's have them afterwards.
+    /// level's have them afterwards. Rims are added to `rims`.
     fn build(
         &self,
         mut trees: Vec<Tree<NodeRecord>>,
         cuts: &mut Vec<(usize, f64)>,
+        rims: &mut Rims,
         districts: &mut Districts,
     ) -> Result<(Vec<Tree<NodeRecord>>, BTreeMap<String, SharedTexture>)> {
         sort(&mut trees);
@@ -171,75 +186,55 @@ impl Level<'_> {
         let items: Vec<Item> = trees.iter().map(|tree| item(&tree.record)).collect();
         let found = groups(&items, triangles, hierarchy.level_factor as usize);
         let lattice = self.lattice(&items, &found);
-        let boxes: Vec<Bounds> = found.iter().map(|group| around(&items, group, lattice)).collect();
-        let others_of = |district: usize| -> Vec<Bounds> {
-            let others = boxes.iter().enumerate().filter(|(other, _)| *other != district);
-            others.filter(|(_, other)| meet(&boxes[district], other)).map(|(_, at)| *at).collect()
-        };
+        let boxes: Vec<Bounds> = items.iter().map(|item| around(item, lattice)).collect();
+        let mut district_of = vec![0; items.len()];
+        for (district, group) in found.iter().enumerate() {
+            group.iter().for_each(|&member| district_of[member] = district);
+        }
         let mut trees: Vec<Option<Tree<NodeRecord>>> = trees.into_iter().map(Some).collect();
-        let taken = |group: Vec<usize>| -> Vec<Tree<NodeRecord>> {
-            group.into_iter().filter_map(|member| trees[member].take()).collect()
+        let mut plan = |(district, group): (usize, Vec<usize>)| {
+            let own: Vec<Bounds> = group.iter().map(|&member| boxes[member]).collect();
+            let around = bounds_of(own.iter().flat_map(|&(low, high)| [low, high]));
+            let others = boxes.iter().zip(&district_of).filter(|(_, of)| **of != district);
+            let others = others.map(|(other, _)| *other);
+            let others = others.filter(|other| meet(&around, other)).collect();
+            let members: Vec<Tree<NodeRecord>> =
+                group.into_iter().filter_map(|member| trees[member].take()).collect();
+            Planned { file: file_of(&members), members, own, around, others }
         };
-        let taken: Vec<_> = found.into_iter().map(taken).collect();
+        let planned: Vec<Planned> = found.into_iter().enumerate().map(&mut plan).collect();
         // Rounded from level to level, as vertices are.
         cuts.iter_mut().for_each(|(_, coordinate)| *coordinate = lattice.round(*coordinate));
-        // Members are read each time that they are needed: those of all districts of a large city would be much
-        // to hold.
-        let read = |members: &[Tree<NodeRecord>], joined: Option<&Joined>| -> Result<Members> {
-            let mut read = self.read(members, lattice)?;
-            if let Some(joined) = joined {
-                self.target.stages.time(Stage::Gather, || joined.apply(&mut read));
+        let meeting = Meeting::of(self, &planned, cuts, lattice)?;
+        let Meeting { joined, borders, .. } = &meeting;
+        let names: Vec<String> = planned.iter().map(|district| district.file.clone()).collect();
+        let make = |number: usize, district: Planned| {
+            let file = district.file.clone();
+            let made_of = meeting.made_of(number, &district, lattice);
+            let report = DistrictReport { file, made_of };
+            if let Some(earlier) = self.earlier
+                && let Some((record, reused_textures)) =
+                    earlier.take_over_district(&report, self.target.out)?
+            {
+                let trees = vec![Tree { record, children: district.members }];
+                let warnings = Warnings::default();
+                return Ok(Made { trees, report: Some(report), reused_textures, warnings });
             }
-            Ok(read)
-        };
-        let several = taken.len() > 1;
-        let joined = match self.meet && several {
-            true => {
-                let joined = Joined::of_cuts(cuts);
-                let ends = in_parallel(taken.iter().collect(), |_, members: &Vec<_>| {
-                    let read = read(members, Some(&joined))?;
-                    Ok(self.target.stages.time(Stage::Gather, || Joined::ends(&read)))
-                })?;
-                Some(self.target.stages.time(Stage::Gather, || joined.with_ends(&ends)))
-            }
-            false => None,
-        };
-        if let Some(joined) = &joined {
-            *cuts = joined.cuts().to_vec();
-        }
-        let cuts = Cuts::new(cuts);
-        let rule = self.keep_rule(lattice);
-        let borders = match several {
-            true => {
-                let rims = in_parallel(taken.iter().collect(), |district, members: &Vec<_>| {
-                    let Surface { chunk, .. } = self.surface(read(members, joined.as_ref())?, None);
-                    let rim = || Rim::new(&chunk.mesh, &cuts, &others_of(district));
-                    Ok(self.target.stages.time(Stage::Gather, rim))
-                })?;
-                let between = || LevelBorder::between(&rims, &cuts, &rule);
-                self.target.stages.time(Stage::Gather, between)
-            }
-            false => LevelBorder::default(),
-        };
-        let make = |district: usize, members: Vec<Tree<NodeRecord>>| {
-            let mut read = read(&members, joined.as_ref())?;
-            // What closes gaps between members is of no use where no other district is.
-            let others = others_of(district);
-            read.skirts.retain(|skirt| {
-                let around = bounds_of(skirt.iter().map(|at| at.to_array()));
-                others.iter().any(|other| meet(&around, other))
-            });
-            let surface = self.surface(read, Some(&borders));
-            self.district(members, surface, &borders, lattice)
+            let mut read = self.read(&district.members, lattice, joined.as_ref())?;
+            district.keep_skirts(&mut read.skirts);
+            let surface = self.surface(read, Some(borders));
+            self.district(district.members, surface, borders, report, lattice)
         };
         // The higher, the more of what is below has to be read to know how far one is off.
         let made: Vec<Made> = match self.target.options.max_memory {
             Some(_) if self.number > 0 => {
-                let made = taken.into_iter().enumerate();
-                made.map(|(district, members)| make(district, members)).collect::<Result<_>>()?
+                let made = planned.into_iter().enumerate();
+                made.map(|(number, district)| make(number, district)).collect::<Result<_>>()?
             }
-            _ => in_parallel(taken, make)?,
+            _ => in_parallel(planned, make)?,
         };
+        let names = names.into_iter().map(|file| (self.number as u32, file));
+        rims.0.extend(names.zip(meeting.rims));
         let mut next = Vec::with_capacity(made.len());
         let mut reused = BTreeMap::new();
         for Made { trees, report, reused_textures, warnings } in made {
@@ -249,6 +244,11 @@ impl Level<'_> {
             districts.warnings.extend(warnings);
         }
         Ok((next, reused))
+    }
+
+    /// What the earlier result knew of a district.
+    fn known_rim(&self, file: &str) -> Option<&KnownRim> {
+        self.known.0.get(&(self.number as u32, file.to_owned()))
     }
 
     /// One lattice for all districts of the level, so that those that meet agree on where.
@@ -284,10 +284,23 @@ impl Level<'_> {
         }
     }
 
-    fn read(&self, members: &[Tree<NodeRecord>], lattice: Lattice) -> Result<Members> {
+    /// Reads members each time that they are needed: those of all districts of a large city would be much to
+    /// hold.
+    fn read(
+        &self,
+        members: &[Tree<NodeRecord>],
+        lattice: Lattice,
+        joined: Option<&Joined>,
+    ) -> Result<Members> {
         let Target { out, stages, .. } = self.target;
         let records = members.iter().map(|tree| &tree.record);
-        stages.time(Stage::Gather, || members::read(out.path(), records, lattice))
+        stages.time(Stage::Gather, || {
+            let mut read = members::read(out.path(), records, lattice)?;
+            if let Some(joined) = joined {
+                joined.apply(&mut read);
+            }
+            Ok(read)
+        })
     }
 
     /// Of members; with strips between those that touch where it is known what is a border with other districts.
@@ -317,23 +330,12 @@ impl Level<'_> {
         members: Vec<Tree<NodeRecord>>,
         surface: Surface,
         borders: &LevelBorder,
+        report: DistrictReport,
         lattice: Lattice,
     ) -> Result<Made> {
         let Surface { mut model, looks, skirts, mut chunk } = surface;
         let Target { options, out, stages, .. } = self.target;
         stages.time(Stage::Gather, || borders.mark(&mut chunk));
-        let prefix = prefix(&members);
-        let file = format!("{prefix}.glb");
-        let made_of = made_of(&members, &chunk, &skirts);
-        let report = DistrictReport { file: file.clone(), made_of };
-        let (reused_textures, warnings) = Default::default();
-        if let Some(earlier) = self.earlier
-            && let Some((record, reused_textures)) =
-                earlier.take_over_district(&file, &report.made_of, out)?
-        {
-            let trees = vec![Tree { record, children: members }];
-            return Ok(Made { trees, report: Some(report), reused_textures, warnings });
-        }
         let records = members.iter().map(|tree| &tree.record);
         stages.time(Stage::Gather, || members::read_pictures(out.path(), records, &mut model))?;
         let Looks { textures, extrudable, .. } = looks;
@@ -352,6 +354,7 @@ impl Level<'_> {
         // As much as a root may have at most.
         let budget = (budget as usize).clamp(1, hierarchy.desired_tris as usize);
         let resolutions = Resolutions::above(triangles, budget, hierarchy);
+        let prefix = prefix_of(&members);
         let place = BlockPlace { prefix, origin, lattice };
         let textures = setup.textures(&chunk.mesh, &resolutions);
         let sink = setup.sink(&textures, &place);
@@ -369,6 +372,7 @@ impl Level<'_> {
             stages.time(Stage::Measure, || error_through(parts, mesh, LOOSE, measure))
         })?;
         let mut warnings = cache.warnings();
+        let reused_textures = BTreeMap::new();
         Ok(match made {
             Ok(record) => {
                 warnings.extend(record.warnings.clone());
@@ -384,12 +388,10 @@ impl Level<'_> {
     }
 }
 
-/// A box around what the files of some nodes have, wherever it is moved to.
-fn around(items: &[Item], group: &[usize], lattice: Lattice) -> Bounds {
-    let corners = group.iter().flat_map(|&member| [items[member].low, items[member].high]);
-    let (low, high) = bounds_of(corners);
+/// A box around what the file of a node has, wherever it is moved to.
+fn around(item: &Item, lattice: Lattice) -> Bounds {
     let reach = 2.0 * (NEAR + lattice.step);
-    (low.map(|at| at - reach), high.map(|at| at + reach))
+    (item.low.map(|at| at - reach), item.high.map(|at| at + reach))
 }
 
 /// Whether two boxes have a place in common.
@@ -411,52 +413,16 @@ fn item(record: &NodeRecord) -> Item<'_> {
     }
 }
 
+fn file_of(members: &[Tree<NodeRecord>]) -> String {
+    format!("{}.glb", prefix_of(members))
+}
+
 /// What the file of a district is called: by what it stands for.
-fn prefix(members: &[Tree<NodeRecord>]) -> String {
+fn prefix_of(members: &[Tree<NodeRecord>]) -> String {
     let mut hasher = blake3::Hasher::new();
     for Tree { record, .. } in members {
         hasher.update(record.file.as_bytes());
         hasher.update(b"\n");
     }
     format!("district-{}", &hasher.finalize().to_hex().as_str()[..12])
-}
-
-/// A hash of all that a district is made of.
-fn made_of(members: &[Tree<NodeRecord>], chunk: &Chunk<f64>, skirts: &[Vec<DVec3>]) -> String {
-    let mut hasher = blake3::Hasher::new();
-    for Tree { record, .. } in members {
-        hasher.update(record.file.as_bytes());
-        hasher.update(&record.file_crc.to_le_bytes());
-        for error in [record.geometric_error, record.mean_error, record.p95_error] {
-            hasher.update(&error.to_le_bytes());
-        }
-    }
-    for bit in 0..chunk.path.len() as u32 {
-        let plane = chunk.path.plane(bit);
-        hasher.update(&plane.coordinate.bits().to_le_bytes());
-        for chain in &plane.chains {
-            chain.positions.as_flattened().iter().for_each(|at| {
-                hasher.update(&at.to_le_bytes());
-            });
-            hasher.update(&chain.keep);
-        }
-    }
-    // Vertices may have been joined with those of others.
-    for at in chunk.mesh.positions.as_flattened() {
-        hasher.update(&at.to_le_bytes());
-    }
-    // Which strips and stitches there are depends on where other districts are.
-    for corner in skirts.iter().flatten() {
-        corner.to_array().iter().for_each(|at| {
-            hasher.update(&at.to_le_bytes());
-        });
-    }
-    for corner in chunk.stitches.as_flattened() {
-        hasher.update(&corner.to_le_bytes());
-    }
-    hasher.update(&chunk.border.keep);
-    for planes in &chunk.border.planes {
-        hasher.update(&planes.to_le_bytes());
-    }
-    hasher.finalize().to_hex().to_string()
 }

@@ -3,9 +3,12 @@
 //! Blocks keep such vertices where each input has them. A district is one surface, and it is off the source by more
 //! than what the vertices are apart, which is measured with the rest.
 
+use blake3::Hasher;
 use rustc_hash::FxHashMap;
 
+use super::made_of::update;
 use super::members::Members;
+use crate::builder::border::shared::Bounds;
 use crate::builder::stitch::open_edges;
 use crate::builder::tiles::meeting::WRITTEN;
 use crate::mesh::{NEAR, NearVertices, Part, PositionKey, all_differ, key};
@@ -16,12 +19,14 @@ use crate::mesh::{NEAR, NearVertices, Part, PositionKey, all_differ, key};
 pub struct Joined {
     cuts: JoinedCuts,
     moved: FxHashMap<PositionKey<f64>, [f64; 3]>,
+    /// The same: from where and to where, in order.
+    moves: Vec<[[f64; 3]; 2]>,
 }
 
 impl Joined {
     /// Of the planes alone, which divided blocks.
     pub fn of_cuts(cuts: &[(usize, f64)]) -> Self {
-        Self { cuts: JoinedCuts::new(cuts), moved: FxHashMap::default() }
+        Self { cuts: JoinedCuts::new(cuts), moved: FxHashMap::default(), moves: Vec::new() }
     }
 
     /// Edges at which the members of a district end.
@@ -32,8 +37,34 @@ impl Joined {
     /// With the vertices, by the [ends](Self::ends) of all districts, to which the planes were
     /// [applied](Self::apply).
     pub fn with_ends(self, ends: &[Vec<[[f64; 3]; 2]>]) -> Self {
-        let moved = joined(&NearVertices::new(ends.iter().flatten().copied(), NEAR));
-        Self { moved, ..self }
+        let moves = joined(&NearVertices::new(ends.iter().flatten().copied(), NEAR));
+        let moved = moves.iter().map(|&[from, to]| (key(from), to)).collect();
+        Self { moved, moves, ..self }
+    }
+
+    /// Adds to a hash what becomes of planes within bounds.
+    pub fn hash_cuts(&self, (low, high): &Bounds, hasher: &mut Hasher) {
+        for (axis, moves) in self.cuts.moves.iter().enumerate() {
+            hasher.update(b"across");
+            let first = moves.partition_point(|(from, _)| *from < low[axis] - WRITTEN);
+            let behind = moves.partition_point(|(from, _)| *from <= high[axis] + WRITTEN);
+            for (from, to) in &moves[first..behind] {
+                update(hasher, *from);
+                update(hasher, *to);
+            }
+        }
+    }
+
+    /// Adds to a hash what becomes of vertices within bounds.
+    pub fn hash_moved(&self, (low, high): &Bounds, hasher: &mut Hasher) {
+        let first = self.moves.partition_point(|[from, _]| from[0] < low[0]);
+        let behind = self.moves.partition_point(|[from, _]| from[0] <= high[0]);
+        let is_in = |[from, _]: &&[[f64; 3]; 2]| {
+            (0..3).all(|axis| low[axis] <= from[axis] && from[axis] <= high[axis])
+        };
+        for ends in self.moves[first..behind].iter().filter(is_in) {
+            ends.as_flattened().iter().for_each(|at| update(hasher, *at));
+        }
     }
 
     /// The planes that there are.
@@ -99,8 +130,8 @@ impl JoinedCuts {
     }
 }
 
-/// Where vertices go that do not stay where they are.
-fn joined(vertices: &NearVertices) -> FxHashMap<PositionKey<f64>, [f64; 3]> {
+/// From where and to where vertices go that do not stay where they are, in order.
+fn joined(vertices: &NearVertices) -> Vec<[[f64; 3]; 2]> {
     let mut moved: FxHashMap<PositionKey<f64>, [f64; 3]> = FxHashMap::default();
     for (number, &position) in (0u32..).zip(vertices.positions()) {
         let stays = |other: u32| {
@@ -111,7 +142,13 @@ fn joined(vertices: &NearVertices) -> FxHashMap<PositionKey<f64>, [f64; 3]> {
             moved.insert(key(position), vertices.positions()[other as usize]);
         }
     }
-    moved
+    let mut moves: Vec<[[f64; 3]; 2]> = vertices
+        .positions()
+        .iter()
+        .filter_map(|from| moved.get(&key(*from)).map(|to| [*from, *to]))
+        .collect();
+    moves.sort_unstable_by_key(|ends| ends.map(key));
+    moves
 }
 
 fn move_vertices(part: &mut Part, moved: &FxHashMap<PositionKey<f64>, [f64; 3]>) {
