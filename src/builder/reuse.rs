@@ -115,7 +115,7 @@ impl Earlier {
 
     /// The rims of its districts; none where it has none that can be read, and all are found out again.
     pub fn rims(&self) -> Rims {
-        Rims::read(&self.dir).ok().flatten().unwrap_or_default()
+        Rims::read(&self.dir).unwrap_or_default()
     }
 
     /// Links the file of a district into the new output, where it is made of what it was made of then.

@@ -97,3 +97,27 @@ impl IndexFile {
         Ok((flags, contents))
     }
 }
+
+/// Changed contents of a file, with its length and checksum set right.
+#[cfg(test)]
+pub(super) fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    bytes.truncate(bytes.len() - 4);
+    IndexFile::end(Sink(bytes))
+}
+
+/// Checks that nothing is read of a file that is cut short or damaged, and that reading ends whatever is in one
+/// whose checksum is right.
+#[cfg(test)]
+pub(super) fn check_damage<T>(bytes: &[u8], read: impl Fn(&[u8]) -> Result<T, String>) {
+    for length in 0..bytes.len() {
+        assert!(read(&bytes[..length]).is_err(), "{length}");
+    }
+    for at in 0..bytes.len() {
+        for bits in [0x10, 0x55] {
+            let mut damaged = bytes.to_vec();
+            damaged[at] ^= bits;
+            assert!(read(&damaged).is_err(), "{at}");
+            drop(read(&sealed(damaged)));
+        }
+    }
+}

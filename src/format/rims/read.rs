@@ -31,14 +31,12 @@ enum Unreadable {
 }
 
 impl Rims {
-    /// Reads the rims of an output folder; none where it has no file of them.
-    pub fn read(dir: &Path) -> Result<Option<Self>> {
+    /// Reads the rims of an output folder, which need not have any.
+    pub fn read(dir: &Path) -> Result<Self> {
         let path = dir.join(RIMS_FILE);
-        match std::fs::read(&path) {
-            Ok(bytes) => Self::from_bytes(&bytes, &path).map(Some),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(error) => Err(Error::input(path, format!("cannot read the rims: {error}"))),
-        }
+        let bytes = std::fs::read(&path)
+            .map_err(|error| Error::input(&path, format!("cannot read the rims: {error}")))?;
+        Self::from_bytes(&bytes, &path)
     }
 
     /// Reads rims from the bytes of their file; `path` is for messages only.

@@ -163,8 +163,8 @@ impl Levels {
         let level = &mut self.nodes[node as usize];
         let is_slow = self.slow_s.is_some_and(|slow_s| self.now_s - slow_s <= AFTER_SLOW_S);
         // Before a camera that stands only what has arrived ranks higher, and that happens once.
-        let is_to_blame = !is_slow && !(was_still && cause == Cause::MakesWay);
-        let is_back = is_to_blame && self.now_s - level.changed_s < BACK_WITHIN_S;
+        let is_excused = is_slow || was_still && cause == Cause::MakesWay;
+        let is_back = !is_excused && self.now_s - level.changed_s < BACK_WITHIN_S;
         // What was refined in this very frame was never seen so; in a sway it rests as it did.
         let was_seen = level.changed_s < self.now_s;
         level.returns = match (was_seen, is_back) {
