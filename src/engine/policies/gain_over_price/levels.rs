@@ -127,12 +127,18 @@ impl Levels {
         self.sway.take_back();
     }
 
-    /// The part of its time that a frame is filled by.
-    pub fn filled(&self) -> f64 {
+    /// Milliseconds that a frame is filled up to whose front takes `ms`, of a budget.
+    pub fn fill_ms(&mut self, budget_ms: f64, ms: f64) -> f64 {
+        let more_ms = self.sway.takes_more(ms);
         match self.sways() {
-            true => 1.0 - self.sway.reserve(),
-            false => 1.0,
+            true => budget_ms * (1.0 - self.sway.reserve()) - more_ms,
+            false => budget_ms,
         }
+    }
+
+    /// What was changed in a frame takes so many milliseconds more.
+    pub fn change(&mut self, ms: f64) {
+        self.sway.change(ms);
     }
 
     /// Whether any was chosen to change in this frame.

@@ -396,7 +396,6 @@ impl Policy for GainOverPrice {
     fn select(&mut self, frame: &FrameInput<'_>, out: &mut Selection) {
         out.clear();
         self.levels.begin_frame(frame, &self.options);
-        self.fill_ms = frame.budget_ms * self.levels.filled();
         self.gain.begin_frame(frame.tree.len(), frame.dt_s);
         self.ranks.resize(frame.tree.len(), 0.0);
         self.upgrades.clear();
@@ -414,7 +413,9 @@ impl Policy for GainOverPrice {
             }
         }
         self.front_into(out);
-        let mut ms = front_ms(frame, &out.front);
+        let before_ms = front_ms(frame, &out.front);
+        let mut ms = before_ms;
+        self.fill_ms = self.levels.fill_ms(frame.budget_ms, ms);
         if ms < MUCH_LATE * frame.budget_ms || !self.hides_enough(frame, out) {
             ms = self.relieve(frame, ms);
             ms = self.refine(frame, ms);
@@ -433,6 +434,9 @@ impl Policy for GainOverPrice {
             self.leap.forget();
         } else if self.leap.is_due(frame.dt_s) {
             self.leap(frame, least, out);
+        }
+        if self.levels.have_changed() && self.levels.sways() {
+            self.levels.change(front_ms(frame, &out.front) - before_ms);
         }
         out.lacking = self.lacking(frame, ms, least);
         self.request(frame, out);

@@ -1,7 +1,9 @@
 //! Whether a camera goes to and fro, and what time is kept free where it does.
 //!
 //! To and fro, the same front takes longer at one end than at the other. What fills the time at the one does
-//! not fit at the other, is taken back there, and fills it again.
+//! not fit at the other, is taken back there, and fills it again. So the time that a front took where it took most
+//! of late is what is filled up from, everywhere; and since what is refined may take more there than here, some is kept
+//! free for each time that it did.
 
 use std::collections::VecDeque;
 
@@ -41,6 +43,11 @@ pub(super) struct Sway {
     looked: VecDeque<(f64, DVec3)>,
     /// For so long it does not get on, seconds.
     stays_s: f64,
+    /// When, and how many milliseconds the front took then, without what it was changed by: of late, and each less
+    /// than the one before it.
+    took: VecDeque<(f64, f64)>,
+    /// Milliseconds that it takes more by all changes to it.
+    changed_ms: f64,
     reserve: f64,
 }
 
@@ -73,6 +80,31 @@ impl Sway {
     /// Whether for some time it has not got on by place, nor by direction, nor turned away, though it moved.
     pub fn is_to_and_fro(&self) -> bool {
         self.stays_s >= LASTS_S
+    }
+
+    /// How many milliseconds more than the `ms` of this frame the front, as it is now, took where it took most of late;
+    /// none unless the camera goes to and fro.
+    pub fn takes_more(&mut self, ms: f64) -> f64 {
+        if !self.is_to_and_fro() {
+            self.took.clear();
+            self.changed_ms = 0.0;
+            return 0.0;
+        }
+        let is_old = |&(at_s, _): &(f64, f64)| self.now_s - at_s > BACK_WITHIN_S;
+        while self.took.front().is_some_and(is_old) {
+            self.took.pop_front();
+        }
+        let unchanged_ms = ms - self.changed_ms;
+        while self.took.back().is_some_and(|&(_, less_ms)| less_ms <= unchanged_ms) {
+            self.took.pop_back();
+        }
+        self.took.push_back((self.now_s, unchanged_ms));
+        self.took[0].1 - unchanged_ms
+    }
+
+    /// The front was changed, by so many milliseconds.
+    pub fn change(&mut self, ms: f64) {
+        self.changed_ms += ms;
     }
 
     /// What was refined shortly before is taken back, for want of time.
@@ -160,6 +192,37 @@ mod tests {
         for found in [sways, looks] {
             assert!(found.iter().all(|&is| is));
         }
+    }
+
+    /// A camera that sways once in six seconds, of which the same front takes 20 ms on one side and 10 on the other.
+    #[test]
+    fn the_longest_that_a_front_took_of_late_counts_everywhere() {
+        let pose = |frame: u32| Pose {
+            position: DVec3::new(wave(f64::from(frame) * DT_S, 6.0), 0.0, 0.0),
+            rotation: from_angles(UpAxis::Z, 0.0, 0.0, 0.0),
+            fov_y_deg: 60.0,
+        };
+        let ms = |frame: u32| 15.0 + 5.0 * pose(frame).position.x;
+        let mut sway = Sway::default();
+        let mut more = Vec::new();
+        for frame in 1..1800 {
+            sway.go(&pose(frame - 1), &pose(frame), DT_S);
+            // By a third less from the middle on, wherever it is.
+            let part = if frame >= 900 { 2.0 / 3.0 } else { 1.0 };
+            more.push((ms(frame) * part, sway.takes_more(ms(frame) * part)));
+            if frame == 899 {
+                sway.change(-20.0 / 3.0);
+            }
+        }
+        assert_eq!(more[10].1, 0.0, "not yet to and fro");
+        let all = |frames: std::ops::Range<usize>, most: f64| {
+            more[frames].iter().all(|(ms, more)| (ms + more - most).abs() < 0.01)
+        };
+        assert!(all(450..898, 20.0));
+        // What a change takes there is known once it was there again.
+        assert!(all(900 + 450..1799, 40.0 / 3.0));
+        sway.go(&pose(0), &Pose { position: DVec3::X * 50.0, ..pose(0) }, DT_S);
+        assert_eq!(sway.takes_more(10.0), 0.0, "it gets on");
     }
 
     #[test]
