@@ -354,6 +354,7 @@ impl Run<'_> {
                         earlier,
                         up,
                         cuts: &cuts,
+                        several: reports.len() > 1,
                         meet: reports.iter().any(|input| !input.meetings.is_empty()),
                     };
                     build_districts(trees, &mut shared_textures, &above)?

@@ -93,7 +93,9 @@ pub struct Above<'a> {
     pub up: UpAxis,
     /// The planes that divided the source into blocks.
     pub cuts: &'a [BlockCut],
-    /// Whether any of its inputs touch.
+    /// Whether it has several inputs, so that some may change while others do not.
+    pub several: bool,
+    /// Whether any of them touch.
     pub meet: bool,
 }
 
@@ -104,7 +106,7 @@ pub fn build_districts(
     textures: &mut BTreeMap<String, SharedTexture>,
     above: &Above,
 ) -> Result<Districts> {
-    let &Above { options, out, stages, progress, earlier, up, cuts, meet } = above;
+    let &Above { options, out, stages, progress, earlier, up, cuts, several, meet } = above;
     let mut districts = Districts::default();
     let known = earlier.map(Earlier::rims).unwrap_or_default();
     let mut rims = Rims::default();
@@ -133,7 +135,7 @@ pub fn build_districts(
             break;
         }
     }
-    if !rims.0.is_empty() {
+    if several && !rims.0.is_empty() {
         out.write(RIMS_FILE, &rims.to_bytes()?)?;
     }
     sort(&mut trees);
