@@ -78,7 +78,7 @@ def measure(arguments, programs, scenes, aside):
     """
     seeds = ["--seeds", str(arguments.seeds)]
     folders = [folder for _, folder in scenes]
-    pictures = ["--reference-every", str(max(1, arguments.frames // 3)), *seeds]
+    pictures = ["--reference-every", str(max(1, arguments.frames // 9)), *seeds]
     none = ["--reference-every", "0", *seeds]
     popped = ["--reference-every", str(arguments.frames), "--seeds", "1", "--pops"]
     card = ["--constants", str(ROOT / "scripts" / "figures" / "fast-card.json")]
@@ -102,7 +102,10 @@ def measure(arguments, programs, scenes, aside):
             replay, "every toggle", folders, POPPED, [TOLD], *popped, frames=arguments.frames // 3
         )
         fast = pool.submit(replay, "fast card", folders, PATHS, [FAST_TARGET], *pictures, *card)
-        still = pool.submit(replay, "standing", folders, ["still", "shake"], [TOLD], *none)
+        # Half of them to settle.
+        still = pool.submit(
+            replay, "standing", folders, ["still", "shake"], [TOLD], *none, frames=2 * arguments.frames
+        )
         ahead = pool.submit(replay, "driving", folders, ["drive", "turn"], [TOLD], *none)
         short = [
             pool.submit(
@@ -154,7 +157,7 @@ def quarter(programs, folder):
 
 def parse():
     options = Options("policies", __doc__, "a small city, 90 frames, one seed")
-    options.add_argument("--frames", type=int, default=450, help="frames of each path, a third of them for every toggle [450]")
+    options.add_argument("--frames", type=int, default=450, help="frames of each path, a third of them for every toggle, twice as many to settle [450]")
     options.add_argument("--seeds", type=int, default=1, help="routes and noises [1]")
     arguments = options.parse()
     if arguments.quick:
@@ -170,9 +173,10 @@ def city_options(arguments):
 def conditions(arguments):
     many = "one seed" if arguments.seeds == 1 else f"{arguments.seeds} seeds"
     return (
-        f"{arguments.frames} frames a path after 300 at its first pose, {many} of route, noise (4.5 %) and "
+        f"{arguments.frames} frames a path after 300 at its first pose, twice as many where the camera stands or "
+        f"sways, {many} of route, noise (4.5 %) and "
         "stalls (one in 10 s, 15 ms), 1280 × 720, model clock with lavapipe's constants, a cap of "
-        "1 GiB. FLIP is against the leaves, of three frames a run. *Late* are frames over the target "
+        "1 GiB. FLIP is against the leaves, of nine frames a run. *Late* are frames over the target "
         "by more than a tenth, *longest late* is how long they lasted in a row. *Used* is of the "
         "target, in frames in which finer detail was in memory. *Lacking* are frames in which a node "
         "would have been drawn that was not in memory. *Estimate* is how far frames were "

@@ -38,6 +38,7 @@ def table_of(figures):
         pops(figures["pops"], told),
         line("toggles a minute, standing", at(figures["still"], path="still"), "toggles_per_min", 0),
         line("toggles a minute, swaying", at(figures["still"], path="shake"), "toggles_per_min", 0),
+        line("the same, after 15 s", at(figures["still"], path="shake"), "settled_toggles_per_min", 0),
         line("read again, a quarter of the memory, MB", figures["short"], "reread_mb", 1),
     ]
     for path in ["drive", "turn"]:

@@ -23,7 +23,7 @@ const fn figure(name: &'static str, head: &'static str, digits: usize) -> Figure
 }
 
 /// The figures of a run, in the order of [`PolicyRun::values`].
-pub const FIGURES: [Figure; 21] = [
+pub const FIGURES: [Figure; 22] = [
     figure("flip_mean", "FLIP", 4),
     figure("flip_p95", "FLIP p95", 4),
     figure("flip_to_oracle", "to oracle", 4),
@@ -33,6 +33,7 @@ pub const FIGURES: [Figure; 21] = [
     figure("longest_late_s", "longest late, s", 2),
     figure("used_percent", "used, %", 0),
     figure("toggles_per_min", "toggles/min", 0),
+    figure("settled_toggles_per_min", "of the second half", 0),
     figure("chosen_per_min", "chosen", 0),
     figure("arrived_per_min", "arrived", 0),
     figure("evicted_per_min", "evicted", 0),
@@ -80,10 +81,7 @@ impl PolicyRun {
         let known = |values: &[f64], value: f64| if values.is_empty() { f64::NAN } else { value };
         let finer = frames.iter().filter(|frame| frame.report.finer_resident);
         let used: Vec<f64> = finer.map(|frame| frame.report.actual_ms / key.target_ms).collect();
-        let minutes = seconds(frames) / 60.0;
-        let per_min = |field: fn(&FrameRecord) -> u32| {
-            frames.iter().map(field).map(f64::from).sum::<f64>() / minutes
-        };
+        let per_min = |field: fn(&FrameRecord) -> u32| per_min(frames, field);
         let pops: Vec<f64> =
             frames.iter().filter_map(|at| at.accuracy.as_ref()?.pop_flip).collect();
         let mb = |bytes: u64| bytes as f64 / 1e6;
@@ -103,6 +101,7 @@ impl PolicyRun {
             longest_late_s(frames, late),
             known(&used, mean(used.iter().copied()) * 100.0),
             per_min(|frame| frame.report.toggles()),
+            self::per_min(&frames[frames.len() / 2..], |frame| frame.report.toggles()),
             per_min(|frame| frame.report.toggle_causes.chosen),
             per_min(|frame| frame.report.toggle_causes.arrived),
             per_min(|frame| frame.report.toggle_causes.evicted),
@@ -132,6 +131,11 @@ impl PolicyRun {
             self.values[at] = value;
         }
     }
+}
+
+/// How many there were of something in a minute.
+fn per_min(frames: &[FrameRecord], field: fn(&FrameRecord) -> u32) -> f64 {
+    frames.iter().map(field).map(f64::from).sum::<f64>() * 60.0 / seconds(frames)
 }
 
 /// Seconds of a path.
@@ -180,7 +184,7 @@ mod tests {
                 frame_ms: ms,
                 actual_ms: ms,
                 modelled_ms: 10.0,
-                toggles_up: 1,
+                toggles_up: if index < 5 { 3 } else { 1 },
                 toggle_causes: ToggleCauses { arrived: 1, ..ToggleCauses::default() },
                 finer_resident: index < 3,
                 lacking: u32::from(index == 5),
@@ -210,7 +214,8 @@ mod tests {
             ("late_percent", 60.0),
             ("longest_late_s", 0.3),
             ("used_percent", (1.0 + 1.2 + 1.2) / 3.0 * 100.0),
-            ("toggles_per_min", 600.0),
+            ("toggles_per_min", 1200.0),
+            ("settled_toggles_per_min", 600.0),
             ("arrived_per_min", 600.0),
             ("chosen_per_min", 0.0),
             ("lacking_percent", 10.0),
