@@ -81,7 +81,7 @@ impl PolicyRun {
         let known = |values: &[f64], value: f64| if values.is_empty() { f64::NAN } else { value };
         let finer = frames.iter().filter(|frame| frame.report.finer_resident);
         let used: Vec<f64> = finer.map(|frame| frame.report.actual_ms / key.target_ms).collect();
-        let per_min = |field: fn(&FrameRecord) -> u32| per_min(frames, field);
+        let second_half = &frames[frames.len() / 2..];
         let pops: Vec<f64> =
             frames.iter().filter_map(|at| at.accuracy.as_ref()?.pop_flip).collect();
         let mb = |bytes: u64| bytes as f64 / 1e6;
@@ -100,12 +100,12 @@ impl PolicyRun {
             mean(times.iter().map(|&ms| f64::from(u8::from(late(ms))))) * 100.0,
             longest_late_s(frames, late),
             known(&used, mean(used.iter().copied()) * 100.0),
-            per_min(|frame| frame.report.toggles()),
-            self::per_min(&frames[frames.len() / 2..], |frame| frame.report.toggles()),
-            per_min(|frame| frame.report.toggle_causes.chosen),
-            per_min(|frame| frame.report.toggle_causes.arrived),
-            per_min(|frame| frame.report.toggle_causes.evicted),
-            per_min(|frame| frame.report.toggle_causes.came_into_view),
+            per_min(frames, |frame| frame.report.toggles()),
+            per_min(second_half, |frame| frame.report.toggles()),
+            per_min(frames, |frame| frame.report.toggle_causes.chosen),
+            per_min(frames, |frame| frame.report.toggle_causes.arrived),
+            per_min(frames, |frame| frame.report.toggle_causes.evicted),
+            per_min(frames, |frame| frame.report.toggle_causes.came_into_view),
             mean(of(|frame| f64::from(u8::from(frame.report.lacking > 0)))) * 100.0,
             // Without any, −0 would be said.
             if inspected.every_toggle { 0.0 + pops.iter().sum::<f64>() } else { f64::NAN },
