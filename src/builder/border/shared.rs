@@ -16,6 +16,11 @@ use crate::mesh::{PositionKey, key};
 /// A box of source coordinates: least and greatest corner.
 pub type Bounds = ([f64; 3], [f64; 3]);
 
+/// Whether two boxes have a place in common.
+pub fn meet(one: &Bounds, other: &Bounds) -> bool {
+    (0..3).all(|axis| one.0[axis] <= other.1[axis] && other.0[axis] <= one.1[axis])
+}
+
 /// Whether a position is in a box, or on its sides.
 pub fn holds((low, high): &Bounds, at: &[f64; 3]) -> bool {
     (0..3).all(|axis| low[axis] <= at[axis] && at[axis] <= high[axis])
@@ -52,7 +57,6 @@ pub fn each_shared<P>(
 ) where
     P: Iterator<Item = [f64; 3]>,
 {
-    let meet = |a: &Bounds, b: &Bounds| (0..3).all(|i| a.0[i] <= b.1[i] && b.0[i] <= a.1[i]);
     // The first block that uses a position, and the last.
     let mut users: FxHashMap<PositionKey<f64>, [u32; 2]> = FxHashMap::default();
     for (number, bounds) in blocks.iter().enumerate() {

@@ -36,7 +36,7 @@ use crate::builder::block_setup::{BlockPlace, BlockSetup, Looks, Target};
 use crate::builder::blocks::gather::{gather, localise};
 use crate::builder::blocks::merge_untextured::merge_untextured;
 use crate::builder::border::chain::KeepRule;
-use crate::builder::border::shared::{Bounds, bounds_of};
+use crate::builder::border::shared::{Bounds, bounds_of, meet};
 use crate::builder::cut::split::Chunk;
 use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::emit::shared_textures::write_textures;
@@ -394,11 +394,6 @@ impl Level<'_> {
 fn around(item: &Item, lattice: Lattice) -> Bounds {
     let reach = 2.0 * (NEAR + lattice.step);
     (item.low.map(|at| at - reach), item.high.map(|at| at + reach))
-}
-
-/// Whether two boxes have a place in common.
-fn meet(one: &Bounds, other: &Bounds) -> bool {
-    (0..3).all(|axis| one.0[axis] <= other.1[axis] && other.0[axis] <= one.1[axis])
 }
 
 fn sort(trees: &mut [Tree<NodeRecord>]) {
