@@ -50,13 +50,14 @@ impl Plane {
     /// Filtered along rows by one kernel and along columns by another. Beyond its border the
     /// plane goes on as it is there.
     pub fn filtered(&self, across: &Kernel, down: &Kernel) -> Self {
-        if self.values.is_empty() {
-            return self.clone();
-        }
         self.across(across).down(down)
     }
 
-    fn across(&self, kernel: &Kernel) -> Self {
+    /// Filtered along rows.
+    pub fn across(&self, kernel: &Kernel) -> Self {
+        if self.values.is_empty() {
+            return self.clone();
+        }
         let (width, radius) = (self.width, kernel.radius());
         let mut values = vec![0f32; self.values.len()];
         let rows = values.par_chunks_mut(width).zip(self.values.par_chunks(width));
@@ -74,7 +75,11 @@ impl Plane {
         Self { width, values }
     }
 
-    fn down(&self, kernel: &Kernel) -> Self {
+    /// Filtered along columns.
+    pub fn down(&self, kernel: &Kernel) -> Self {
+        if self.values.is_empty() {
+            return self.clone();
+        }
         let (width, radius) = (self.width, kernel.radius());
         let last = self.height() - 1;
         let mut values = vec![0f32; self.values.len()];

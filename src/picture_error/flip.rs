@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 use image::RgbImage;
+use image::imageops::crop_imm;
 use rayon::prelude::*;
 
 use super::color::{hunt, hunt_of_rgb, opponent};
@@ -90,7 +91,53 @@ pub fn flip(reference: &RgbImage, test: &RgbImage, pixels_per_degree: f64) -> Op
     if reference.dimensions() != test.dimensions() {
         return None;
     }
-    let width = reference.width();
+    let (width, height) = reference.dimensions();
+    let mut values = vec![0.0; (width * height) as usize];
+    if let Some([x, y, across, down]) = matters(reference, test, pixels_per_degree) {
+        let [reference, test] =
+            [reference, test].map(|p| crop_imm(p, x, y, across, down).to_image());
+        let part = flip_of_all(&reference, &test, pixels_per_degree);
+        let rows = values.chunks_mut(width as usize).skip(y as usize);
+        for (row, part) in rows.zip(part.chunks(across as usize)) {
+            row[x as usize..(x + across) as usize].copy_from_slice(part);
+        }
+    }
+    Some(FlipMap { width, values })
+}
+
+/// The part of two pictures outside of which they do not differ, nor does anything that a filter makes of
+/// them: its left and upper end, and its width and height. Nothing where they are the same.
+fn matters(a: &RgbImage, b: &RgbImage, pixels_per_degree: f64) -> Option<[u32; 4]> {
+    let (width, height) = a.dimensions();
+    let row = |picture: &'_ RgbImage| 3 * picture.width().max(1) as usize;
+    let rows = a.as_raw().chunks(row(a)).zip(b.as_raw().chunks(row(b)));
+    let (mut columns, mut lines) = ([u32::MAX, 0], [u32::MAX, 0]);
+    let widen = |[least, most]: &mut [u32; 2], at: u32| {
+        (*least, *most) = ((*least).min(at), (*most).max(at));
+    };
+    for (y, (a, b)) in rows.enumerate() {
+        let differ = |(a, b): (&u8, &u8)| a != b;
+        let Some(first) = a.iter().zip(b).position(differ) else { continue };
+        let last = a.iter().zip(b).rposition(differ).unwrap_or(first);
+        widen(&mut lines, y as u32);
+        widen(&mut columns, first as u32 / 3);
+        widen(&mut columns, last as u32 / 3);
+    }
+    if lines[0] > lines[1] {
+        return None;
+    }
+    // Once for what a difference reaches, and once more for what that is made of.
+    let margin = 2 * blur_radius(pixels_per_degree).max(feature_radius(pixels_per_degree)) as u32;
+    let range = |[least, most]: [u32; 2], side: u32| {
+        let from = least.saturating_sub(margin);
+        [from, side.min(most.saturating_add(margin + 1)) - from]
+    };
+    let ([x, across], [y, down]) = (range(columns, width), range(lines, height));
+    Some([x, y, across, down])
+}
+
+/// The difference at each pixel, row by row.
+fn flip_of_all(reference: &RgbImage, test: &RgbImage, pixels_per_degree: f64) -> Vec<f32> {
     let pictures = [reference, test].map(opponent);
     let features = feature_difference(&pictures, pixels_per_degree);
     let blurs = BLUR.map(|bells| Blur::new(bells, pixels_per_degree));
@@ -105,7 +152,22 @@ pub fn flip(reference: &RgbImage, test: &RgbImage, pixels_per_degree: f64) -> Op
         let color = redistributed(hyab(*a, *b).powf(COLOR_EXPONENT), most);
         color.powf(1.0 - feature) // eq. 8
     });
-    Some(FlipMap { width, values: values.collect() })
+    values.collect()
+}
+
+/// Pixels that the blur of an eye reaches: three standard deviations of the widest of its Gaussians.
+fn blur_radius(pixels_per_degree: f64) -> usize {
+    (3.0 * (WIDEST / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as usize
+}
+
+/// The standard deviation of what finds edges and points, in pixels.
+fn feature_sigma(pixels_per_degree: f64) -> f64 {
+    0.5 * FEATURE_WIDTH * pixels_per_degree
+}
+
+/// Pixels that it reaches.
+fn feature_radius(pixels_per_degree: f64) -> usize {
+    (3.0 * feature_sigma(pixels_per_degree)).ceil() as usize
 }
 
 /// What blurs one channel (section 4.1.2): a sum of Gaussians, each with its share.
@@ -113,9 +175,7 @@ struct Blur(Vec<(f32, Kernel)>);
 
 impl Blur {
     fn new(bells: &[Bell], pixels_per_degree: f64) -> Self {
-        // Three standard deviations of the widest.
-        let reach = 3.0 * (WIDEST / (2.0 * PI * PI)).sqrt() * pixels_per_degree;
-        let radius = reach.ceil() as usize;
+        let radius = blur_radius(pixels_per_degree);
         let parts: Vec<(f64, Kernel)> = bells
             .iter()
             .map(|&Bell { a, b }| {
@@ -170,8 +230,8 @@ fn feature_difference(pictures: &[[Plane; 3]; 2], pixels_per_degree: f64) -> Pla
 /// How much of an edge and of a point there is at each pixel (section 4.2.1): the lengths of the
 /// first and of the second derivatives of a Gaussian.
 fn features(lightness: &Plane, pixels_per_degree: f64) -> [Plane; 2] {
-    let sigma = 0.5 * FEATURE_WIDTH * pixels_per_degree;
-    let radius = (3.0 * sigma).ceil() as usize;
+    let sigma = feature_sigma(pixels_per_degree);
+    let radius = feature_radius(pixels_per_degree);
     let steps = || (-(radius as i64)..=radius as i64).map(|x| x as f64);
     let bell = |x: f64| (-x * x / (2.0 * sigma * sigma)).exp();
     let sum: f64 = steps().map(bell).sum();
@@ -184,9 +244,10 @@ fn features(lightness: &Plane, pixels_per_degree: f64) -> [Plane; 2] {
     };
     let first = derivative(&|x| -x * bell(x));
     let second = derivative(&|x| (x * x / (sigma * sigma) - 1.0) * bell(x));
+    let smoothed = lightness.across(&smooth);
     [first, second].map(|kernel| {
         let across = lightness.filtered(&kernel, &smooth);
-        across.zip(&lightness.filtered(&smooth, &kernel), f32::hypot)
+        across.zip(&smoothed.down(&kernel), f32::hypot)
     })
 }
 
@@ -248,6 +309,26 @@ mod tests {
         assert_eq!(flip(&a, &a, PIXELS_PER_DEGREE).unwrap().mean(), 0.0);
         assert_eq!(flip(&a, &b, PIXELS_PER_DEGREE), flip(&b, &a, PIXELS_PER_DEGREE));
         assert_eq!(flip(&a, &RgbImage::new(64, 47), PIXELS_PER_DEGREE), None);
+    }
+
+    #[test]
+    fn what_lies_outside_of_all_differences_is_left_out_and_changes_nothing() {
+        let before = RgbImage::from_fn(160, 120, |x, y| {
+            image::Rgb([x as u8, (x * y % 251) as u8, 2 * y as u8])
+        });
+        let mut after = before.clone();
+        // One place in the middle, one in a corner, and one row.
+        for places in [&[(70, 66), (75, 61)][..], &[(0, 119)], &[(0, 50), (159, 50)]] {
+            for &(x, y) in places {
+                after.put_pixel(x, y, image::Rgb([255, 0, 99]));
+            }
+            let found = flip(&before, &after, PIXELS_PER_DEGREE).unwrap();
+            assert_eq!(found.values, flip_of_all(&before, &after, PIXELS_PER_DEGREE));
+            assert!(found.mean() > 0.0);
+            after = before.clone();
+        }
+        let part = matters(&before, &before, PIXELS_PER_DEGREE);
+        assert_eq!((part, flip(&before, &before, PIXELS_PER_DEGREE).unwrap().mean()), (None, 0.0));
     }
 
     #[test]

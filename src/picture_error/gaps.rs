@@ -5,17 +5,16 @@ use image::GrayImage;
 /// Where two pictures of the same view differ in what is surface and what is background.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Gaps {
-    width: u32,
     /// Pixels with surface in the reference.
     pub reference_pixels: u64,
     /// Background in the picture where the reference has surface: its pixels.
     pub gaps: Vec<[u32; 2]>,
     /// Pixels with surface in the picture where the reference has background.
     pub extra_pixels: u64,
-    /// For each pixel the squared distance to the nearest background of the reference.
-    to_background: Vec<u64>,
-    /// For each pixel the squared distance to the nearest surface of the picture.
-    to_surface: Vec<u64>,
+    /// To the nearest background of the reference.
+    to_background: Distances,
+    /// To the nearest surface of the picture.
+    to_surface: Distances,
 }
 
 /// More than the square of any distance in a picture, where there is no background at all.
@@ -40,67 +39,75 @@ impl Gaps {
         }
         // Of use for gaps alone.
         let [to_background, to_surface] = match gaps.is_empty() {
-            true => [Vec::new(), Vec::new()],
-            false => [distances(reference, |value| value == 0), distances(picture, |v| v > 0)],
+            true => [Distances::default(), Distances::default()],
+            false => {
+                [Distances::to(reference, |value| value == 0), Distances::to(picture, |v| v > 0)]
+            }
         };
-        let width = reference.width();
-        Some(Self { width, reference_pixels, gaps, extra_pixels, to_background, to_surface })
+        Some(Self { reference_pixels, gaps, extra_pixels, to_background, to_surface })
     }
 
     /// Those gaps that no outline explains which lies up to `reach` pixels further in: they are
     /// farther than that from the reference's background, so that background is seen *through* the
     /// model, or from the picture's surface, so that something is gone altogether.
     pub fn inner(&self, mut reach: impl FnMut([u32; 2]) -> f64) -> Vec<[u32; 2]> {
-        let distance = |[x, y]: [u32; 2]| {
-            let at = y as usize * self.width as usize + x as usize;
-            (self.to_background[at].max(self.to_surface[at]) as f64).sqrt()
+        let distance = |at: [u32; 2]| {
+            (self.to_background.squared(at).max(self.to_surface.squared(at)) as f64).sqrt()
         };
         self.gaps.iter().copied().filter(|&at| distance(at) > reach(at)).collect()
     }
 }
 
-/// For each pixel the squared distance to the nearest that is sought: along columns first, and then
-/// the least over each row of what columns have and how far away they are.
-fn distances(picture: &GrayImage, sought: impl Fn(u8) -> bool) -> Vec<u64> {
-    let (width, height) = (picture.width() as usize, picture.height() as usize);
-    let mut squares = vec![FAR; width * height];
-    for x in 0..width {
-        let found = |y: usize| sought(picture.as_raw()[y * width + x]);
-        let mut nearest = |order: &mut dyn Iterator<Item = usize>| {
-            let mut last = None;
-            for y in order {
-                if found(y) {
-                    last = Some(y);
+/// How far pixels are from the nearest that is sought: along columns, from which the least over a row, of what
+/// columns have and how far away they are, is found where it is asked for.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+struct Distances {
+    width: usize,
+    /// For each pixel the squared distance to the nearest in its column.
+    squares: Vec<u64>,
+}
+
+impl Distances {
+    fn to(picture: &GrayImage, sought: impl Fn(u8) -> bool) -> Self {
+        let width = picture.width() as usize;
+        let mut squares = vec![FAR; picture.as_raw().len()];
+        let rows = picture.as_raw().chunks(width).zip(squares.chunks_mut(width)).enumerate();
+        // Row by row down, and then up: the last place in each column, whichever way that was.
+        let mut last = vec![None; width];
+        let mut nearest = |(y, (row, squares)): (usize, (&[u8], &mut [u64]))| {
+            for ((&value, slot), last) in row.iter().zip(squares).zip(&mut last) {
+                if sought(value) {
+                    *last = Some(y);
                 }
-                if let Some(last) = last {
-                    let square = (y.abs_diff(last) as u64).pow(2);
-                    let slot = &mut squares[y * width + x];
-                    *slot = square.min(*slot);
+                if let Some(last) = *last {
+                    *slot = (y.abs_diff(last) as u64).pow(2).min(*slot);
                 }
             }
         };
-        nearest(&mut (0..height));
-        nearest(&mut (0..height).rev());
+        rows.for_each(&mut nearest);
+        let rows = picture.as_raw().chunks(width).zip(squares.chunks_mut(width)).enumerate();
+        rows.rev().for_each(&mut nearest);
+        Self { width, squares }
     }
-    let mut row = vec![0; width];
-    for y in 0..height {
-        let line = &mut squares[y * width..(y + 1) * width];
-        row.copy_from_slice(line);
-        for (x, slot) in line.iter_mut().enumerate() {
-            // Columns further away than what was found cannot have anything nearer.
-            for away in 1..width {
-                let square = (away as u64).pow(2);
-                if square >= *slot {
-                    break;
-                }
-                let sides = [x.checked_sub(away), Some(x + away).filter(|&x| x < width)];
-                for side in sides.into_iter().flatten() {
-                    *slot = (*slot).min(row[side] + square);
-                }
+
+    /// Of a pixel, squared; [`FAR`] where there is none.
+    fn squared(&self, [x, y]: [u32; 2]) -> u64 {
+        let (x, y) = (x as usize, y as usize);
+        let row = &self.squares[y * self.width..(y + 1) * self.width];
+        let mut least = row[x];
+        // Columns further away than what was found cannot have anything nearer.
+        for away in 1..self.width {
+            let square = (away as u64).pow(2);
+            if square >= least {
+                break;
+            }
+            let sides = [x.checked_sub(away), Some(x + away).filter(|&x| x < self.width)];
+            for side in sides.into_iter().flatten() {
+                least = least.min(row[side] + square);
             }
         }
+        least
     }
-    squares
 }
 
 #[cfg(test)]
@@ -148,7 +155,9 @@ mod tests {
         for share in [0.02, 0.3, 0.9] {
             let bits: Vec<bool> = (0..19 * 23).map(|_| random.between(0.0, 1.0) > share).collect();
             let picture = mask(19, 23, |x, y| bits[(y * 19 + x) as usize]);
-            for (at, found) in distances(&picture, |value| value == 0).into_iter().enumerate() {
+            let distances = Distances::to(&picture, |value| value == 0);
+            for at in 0..bits.len() {
+                let found = distances.squared([at as u32 % 19, at as u32 / 19]);
                 let square = |other: usize| {
                     let away = |a: usize, b: usize| a.abs_diff(b) as u64;
                     away(at % 19, other % 19).pow(2) + away(at / 19, other / 19).pow(2)

@@ -9,7 +9,7 @@ use super::accuracy::{Accuracy, FrameInspector, FrameSample, ReferenceContext, W
 use super::session::Session;
 use crate::camera::View;
 use crate::engine::FarShown;
-use crate::picture_error::{Gaps, PIXELS_PER_DEGREE, flip, mean_squared_error, ssim};
+use crate::picture_error::{FlipMap, Gaps, PIXELS_PER_DEGREE, flip, mean_squared_error, ssim};
 use crate::render::RenderOptions;
 use crate::render::content::TextureFormat;
 use crate::runtime::{SceneTree, front_before};
@@ -109,7 +109,8 @@ impl Reference {
         &mut self,
         frame: u64,
         accuracy: &Accuracy,
-        [drawn, reference, difference]: [&RgbImage; 3],
+        [drawn, reference]: [&RgbImage; 2],
+        difference: &FlipMap,
     ) -> Result<()> {
         let flip = accuracy.flip_mean;
         let place = self.worst.partition_point(|worst| worst.accuracy.flip_mean >= flip);
@@ -122,7 +123,7 @@ impl Reference {
             accuracy: accuracy.clone(),
             drawn: jpeg(drawn)?,
             reference: jpeg(reference)?,
-            difference: jpeg(difference)?,
+            difference: jpeg(&difference.picture())?,
         };
         self.worst.insert(place, worst);
         Ok(())
@@ -184,7 +185,7 @@ impl FrameInspector for Reference {
             let pop = flip(&before, picture, PIXELS_PER_DEGREE).ok_or_else(other_size)?;
             accuracy.pop_flip = Some(pop.mean());
         }
-        self.keep(frame, &accuracy, [picture, expected, &map.picture()])?;
+        self.keep(frame, &accuracy, [picture, expected], &map)?;
         Ok(accuracy)
     }
 }
