@@ -32,11 +32,13 @@ const SEEN: f64 = 0.1;
 /// For so many times the budget nodes are refined to find out what they hide; one after the other.
 const STRETCHES: [f64; 4] = [1.2, 1.5, 2.0, 3.0];
 
-/// Which nodes a leap leaves as they are.
+/// Which nodes a leap leaves as they are, and which it need not.
 pub(super) struct Rests<'a> {
     pub levels: &'a Levels,
     /// The least rank of those that are refined, if any is.
     pub least: Option<f64>,
+    /// Refined nodes of which no child is, that may make way: the least rank first.
+    pub way: Vec<Ranked>,
 }
 
 impl Rests<'_> {
@@ -65,6 +67,8 @@ pub(super) struct Leap {
 pub(super) struct Leapt {
     /// Nodes that are refined by it, coarse to fine.
     pub refined: Vec<u32>,
+    /// Nodes that make way for these: coarse again.
+    pub coarsened: Vec<u32>,
     /// Nodes of the new front that the rest of it hides.
     pub hidden: Vec<u32>,
 }
@@ -83,7 +87,7 @@ impl Leap {
     /// Tries one from a front of which no node fits into `budget_ms` that could be refined: nodes are refined by
     /// their rank for longer than there is time, and in the time that is left without what they hide. One of them
     /// at least must rank higher than the least of those that are refined, by `hysteresis`, unless there is time
-    /// left over.
+    /// left over. What ranks so much lower makes way.
     pub fn find(
         &mut self,
         frame: &FrameInput<'_>,
@@ -107,7 +111,7 @@ impl Leap {
         self.next += 1;
         let is_hidden = |node: u32| frame.is_hidden(node);
         let mut more = Refined::of(frame, front, &is_hidden, rests);
-        more.refine(stretch_ms, gain);
+        more.refine(stretch_ms, gain, &mut &[][..], hysteresis);
         // What is drawn has its children asked for already.
         let drawn: BTreeSet<u32> = front.iter().copied().collect();
         self.wanted.clear();
@@ -116,22 +120,25 @@ impl Leap {
         let behind = hidden.behind(frame.tree, &more.front, frame.view);
         let is_hidden = |node: u32| behind.hides(node);
         let mut leapt = Refined::of(frame, front, &is_hidden, rests);
-        leapt.refine(budget_ms, gain);
+        let mut way = &rests.way[..];
+        leapt.refine(budget_ms, gain, &mut way, hysteresis);
         if leapt.highest <= least {
             return None;
         }
         // Less is refined now, and may hide less; and boxes may cover more of the image than before.
         for _ in 0..=MOST_UNDONE {
-            if leapt.nodes.is_empty() {
-                return None;
-            }
+            let below = leapt.nodes.last()?.rank / hysteresis;
             let behind = hidden.behind(frame.tree, &leapt.front, frame.view);
             let is_hidden = |node: u32| behind.hides(node);
-            if drawn_ms(frame, &leapt.front, &is_hidden) <= budget_ms {
+            let over_ms = drawn_ms(frame, &leapt.front, &is_hidden) - budget_ms;
+            if over_ms <= 0.0 {
                 let hidden = leapt.front.iter().copied().filter(|&node| is_hidden(node)).collect();
-                return Some(Leapt { refined: leapt.nodes, hidden });
+                let refined = leapt.nodes.iter().map(|ranked| ranked.node).collect();
+                return Some(Leapt { refined, coarsened: leapt.coarsened, hidden });
             }
-            leapt.undo_last();
+            if leapt.make_way(over_ms, &mut way, below, &is_hidden).is_none() {
+                leapt.undo_last();
+            }
         }
         None
     }
@@ -160,7 +167,9 @@ struct Refined<'a> {
     rests: &'a Rests<'a>,
     front: Vec<u32>,
     /// What was refined, coarse to fine.
-    nodes: Vec<u32>,
+    nodes: Vec<Ranked>,
+    /// What made way.
+    coarsened: Vec<u32>,
     /// The highest rank of that, 0 where there is none.
     highest: f64,
     /// What would be refined too, were its children in memory, with ranks.
@@ -174,12 +183,21 @@ impl<'a> Refined<'a> {
         is_hidden: &'a dyn Fn(u32) -> bool,
         rests: &'a Rests<'a>,
     ) -> Self {
-        let (nodes, lacking) = (Vec::new(), Vec::new());
-        Self { frame, is_hidden, rests, front: front.to_vec(), nodes, highest: 0.0, lacking }
+        Self {
+            frame,
+            is_hidden,
+            rests,
+            front: front.to_vec(),
+            nodes: Vec::new(),
+            coarsened: Vec::new(),
+            highest: 0.0,
+            lacking: Vec::new(),
+        }
     }
 
-    /// Refines by rank what is not hidden until it takes so many milliseconds.
-    fn refine(&mut self, most_ms: f64, gain: &mut Gain) {
+    /// Refines by rank what is not hidden until it takes so many milliseconds; the first of `way` makes way
+    /// for what ranks higher by `hysteresis`.
+    fn refine(&mut self, most_ms: f64, gain: &mut Gain, way: &mut &[Ranked], hysteresis: f64) {
         let &mut Self { frame, is_hidden, rests, .. } = self;
         let mut ms = drawn_ms(frame, &self.front, is_hidden);
         let mut upgrades = BinaryHeap::new();
@@ -193,31 +211,83 @@ impl<'a> Refined<'a> {
         };
         self.front.iter().for_each(|&node| push(&mut upgrades, node));
         while let Some(Ranked { rank, node }) = upgrades.pop() {
+            let parent = frame.tree.node(node).parent;
+            if parent.is_some_and(|parent| self.coarsened.contains(&parent)) {
+                continue;
+            }
             let drawn = visible_children(frame, node).filter(|&child| !is_hidden(child));
             ms += added_ms(frame, node, drawn);
-            if ms > most_ms {
-                break;
-            } else if !frame.can_refine(node) {
+            let over_ms = ms - most_ms;
+            if !frame.can_refine(node) {
+                if over_ms > 0.0 {
+                    break;
+                }
                 self.lacking.push((node, rank));
                 continue;
             }
-            self.nodes.push(node);
+            // What it came from is no way for it.
+            self.nodes.push(Ranked { rank, node });
+            if over_ms > 0.0 {
+                let Some(freed_ms) = self.make_way(over_ms, way, rank / hysteresis, is_hidden)
+                else {
+                    self.nodes.pop();
+                    break;
+                };
+                ms -= freed_ms;
+            }
             self.highest = self.highest.max(rank);
             for child in visible_children(frame, node) {
                 self.front.push(child);
                 push(&mut upgrades, child);
             }
         }
-        let gone: BTreeSet<u32> = self.nodes.iter().copied().collect();
+        let gone: BTreeSet<u32> = self.nodes.iter().map(|ranked| ranked.node).collect();
         self.front.retain(|node| !gone.contains(node));
     }
 
     /// Leaves the node as it was that was refined last.
     fn undo_last(&mut self) {
-        let Some(node) = self.nodes.pop() else { return };
+        if let Some(Ranked { node, .. }) = self.nodes.pop() {
+            self.coarsen(node);
+        }
+    }
+
+    fn coarsen(&mut self, node: u32) {
         let children = self.frame.tree.children(node);
         self.front.retain(|at| !children.contains(at));
         self.front.push(node);
+    }
+
+    /// Coarsens the first of `way`, below a rank, until so many milliseconds are freed; how many. None where
+    /// that does not come to as much.
+    fn make_way(
+        &mut self,
+        over_ms: f64,
+        way: &mut &[Ranked],
+        below: f64,
+        is_hidden: &dyn Fn(u32) -> bool,
+    ) -> Option<f64> {
+        let frame = self.frame;
+        let (mut freed_ms, mut coarsened) = (0.0, Vec::new());
+        let mut others = *way;
+        while freed_ms < over_ms {
+            let (&Ranked { rank, node }, after) = others.split_first()?;
+            if rank >= below {
+                return None;
+            }
+            others = after;
+            let is_refined = |child: u32| self.nodes.iter().any(|ranked| ranked.node == child);
+            let is_last = visible_children(frame, node).all(|child| !is_refined(child));
+            let drawn = || visible_children(frame, node).filter(|&child| !is_hidden(child));
+            if is_last && drawn().next().is_some() {
+                freed_ms += added_ms(frame, node, drawn());
+                coarsened.push(node);
+            }
+        }
+        coarsened.iter().for_each(|&node| self.coarsen(node));
+        self.coarsened.append(&mut coarsened);
+        *way = others;
+        Some(freed_ms)
     }
 }
 

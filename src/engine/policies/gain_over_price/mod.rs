@@ -324,11 +324,22 @@ impl GainOverPrice {
     /// Refines what hides so much that all of it fits, where what ranks higher than `least`, by as much as
     /// others make way for, does not fit otherwise.
     fn leap(&mut self, frame: &FrameInput<'_>, least: Option<f64>, out: &mut Selection) {
-        let rests = Rests { levels: &self.levels, least };
+        let makes_way = |&node: &u32| {
+            self.levels.is_refined(node) && self.is_last(frame, node) && !self.levels.is_fresh(node)
+        };
+        let way = self.visited.iter().copied().filter(makes_way);
+        let mut way: Vec<Ranked> =
+            way.map(|node| Ranked { rank: self.ranks[node as usize], node }).collect();
+        way.sort_unstable();
+        let rests = Rests { levels: &self.levels, least, way };
         let hysteresis = self.options.hysteresis;
         let found =
             self.leap.find(frame, self.fill_ms, &out.front, &rests, hysteresis, &mut self.gain);
         let Some(leapt) = found else { return };
+        for node in leapt.coarsened {
+            let rank = self.ranks[node as usize];
+            self.levels.coarsen(node, rank, Cause::MakesWay, &self.options);
+        }
         for node in leapt.refined {
             self.levels.refine(node);
             for &child in frame.tree.children(node) {

@@ -357,6 +357,31 @@ fn what_hides_the_rest_is_refined_though_there_is_time_for_it_only_then() {
 }
 
 #[test]
+fn what_ranks_low_makes_way_for_what_hides_the_rest() {
+    // Near: 0 → 1 to 4, of which 1 is a wall; behind it: 5 → 6, 7 and 8 → 9, 10; beside it: 11 → 12, 13.
+    let at = [21.0, 10.0, 0.0];
+    let children = (0..2).map(|_| sketch(at, 1.0, vec![])).collect();
+    let beside = Sketch { error: 0.02, ..sketch(at, 1.0, children) };
+    let behind = || root(20.0, 0.0001, 2);
+    let mut frame = TestFrame::new(tree(vec![root(10.0, 1.0, 4), behind(), behind(), beside]));
+    let mut hidden = HiddenNodes::new(frame.tree.len(), 0.1);
+    hidden.set(1, Some(test_wall(10.5)));
+    let mut policy = policy(&[]);
+    let mut fronts = |frame: &TestFrame, frames: usize| {
+        let fronts = (0..frames).map(|_| drawn(&mut *policy, frame, None, &mut hidden));
+        fronts.collect::<Vec<_>>()
+    };
+    // Of 52 ms four walls take 40, and what is beside them 20, or 10.
+    frame.target_ms = 52.0;
+    frame.residents.set(1, false);
+    assert_eq!(fronts(&frame, 30).last().unwrap(), &[0, 5, 8, 12, 13], "the wall is not there");
+    frame.residents.set(1, true);
+    assert_eq!(fronts(&frame, 90)[30..], vec![vec![1, 2, 3, 4, 11]; 60]);
+    frame.target_ms = 62.0;
+    assert_eq!(fronts(&frame, 90).last().unwrap(), &[1, 2, 3, 4, 12, 13]);
+}
+
+#[test]
 fn where_the_camera_jumps_to_what_hides_itself_nothing_is_relieved() {
     // Near: 0 → 1, 2, of which 1 is a wall; behind it 3 → 4, 5.
     let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), root(20.0, 0.01, 2)]));
