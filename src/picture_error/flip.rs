@@ -92,7 +92,7 @@ pub fn flip(reference: &RgbImage, test: &RgbImage, pixels_per_degree: f64) -> Op
         return None;
     }
     let (width, height) = reference.dimensions();
-    let mut values = vec![0.0; (width * height) as usize];
+    let mut values = vec![0.0; width as usize * height as usize];
     if let Some([x, y, across, down]) = matters(reference, test, pixels_per_degree) {
         let [reference, test] =
             [reference, test].map(|p| crop_imm(p, x, y, across, down).to_image());
@@ -109,7 +109,7 @@ pub fn flip(reference: &RgbImage, test: &RgbImage, pixels_per_degree: f64) -> Op
 /// them: its left and upper end, and its width and height. Nothing where they are the same.
 fn matters(a: &RgbImage, b: &RgbImage, pixels_per_degree: f64) -> Option<[u32; 4]> {
     let (width, height) = a.dimensions();
-    let row = |picture: &'_ RgbImage| 3 * picture.width().max(1) as usize;
+    let row = |picture: &RgbImage| 3 * picture.width().max(1) as usize;
     let rows = a.as_raw().chunks(row(a)).zip(b.as_raw().chunks(row(b)));
     let (mut columns, mut lines) = ([u32::MAX, 0], [u32::MAX, 0]);
     let widen = |[least, most]: &mut [u32; 2], at: u32| {
