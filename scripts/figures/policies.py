@@ -78,7 +78,7 @@ def measure(arguments, programs, scenes, aside):
     """
     seeds = ["--seeds", str(arguments.seeds)]
     folders = [folder for _, folder in scenes]
-    pictures = ["--reference-every", str(max(1, arguments.frames // 9)), *seeds]
+    pictures = ["--reference-every", str(max(1, arguments.frames // 12)), *seeds]
     none = ["--reference-every", "0", *seeds]
     popped = ["--reference-every", str(arguments.frames), "--seeds", "1", "--pops"]
     card = ["--constants", str(ROOT / "scripts" / "figures" / "fast-card.json")]
@@ -176,7 +176,7 @@ def conditions(arguments):
         f"{arguments.frames} frames a path after 300 at its first pose, twice as many where the camera stands or "
         f"sways, {many} of route, noise (4.5 %) and "
         "stalls (one in 10 s, 15 ms), 1280 × 720, model clock with lavapipe's constants, a cap of "
-        "1 GiB. FLIP is against the leaves, of nine frames a run. *Late* are frames over the target "
+        "1 GiB. FLIP is against the leaves, of a dozen frames a run. *Late* are frames over the target "
         "by more than a tenth, *longest late* is how long they lasted in a row. *Used* is of the "
         "target, in frames in which finer detail was in memory. *Lacking* are frames in which a node "
         "would have been drawn that was not in memory. *Estimate* is how far frames were "
