@@ -20,6 +20,7 @@ from common import (
     texels_written,
     write_between_markers,
 )
+from disk import bandwidth
 
 # Of the generated cities: as in Cozzi & Loo's, 5.6 M triangles in 70 blocks.
 TRIANGLES_PER_BLOCK = 80_000
@@ -30,6 +31,10 @@ THESIS_TEXELS = 105
 TORN_TRIANGLES_PER_BLOCK = 16_000
 TORN_TEXELS = 1000
 TORN = "city of torn charts"
+# As cities come that are larger than memory: files, and what a build may hold.
+LARGE_BLOCKS = 400
+LARGE_TRIANGLES = 64_000_000
+LARGE_MEMORY = "1GiB"
 # What textures add is measured on these, and on generated cities of as many texels as those above.
 SCANS = ["sceaux", "oblique_b"]
 STAGES = ["compare", "import", "gather", "pictures", "cut", "simplify", "measure"]
@@ -44,7 +49,8 @@ def main():
     cities = [run for run in runs if run["texels"]]
     findings = [scaling(runs, threads), jpeg_table(programs, arguments, runs)]
     about = [machine(), conditions(arguments)]
-    full = paragraphs(about + [main_table(runs), stage_table(runs)] + findings)
+    disk = disk_table(programs, [run for run in runs if run["threads"] == threads[-1]])
+    full = paragraphs(about + [main_table(runs), disk, stage_table(runs)] + findings)
     print(full)
     if arguments.write:
         write_between_markers(DOCS / "benchmarks.md", "figures", full)
@@ -59,9 +65,16 @@ def paragraphs(parts):
 def parse():
     quick = "0.2 M triangles, one run"
     runs = ("the median of how many runs", 3)
-    arguments = Options("bench-build", __doc__, quick, runs, real=True).parse()
+    options = Options("bench-build", __doc__, quick, runs, real=True)
+    options.add_argument(
+        "--no-large",
+        dest="large",
+        action="store_false",
+        help=f"without {LARGE_TRIANGLES / 1e6:g} M triangles, which take 8 GB of disk",
+    )
+    arguments = options.parse()
     if arguments.quick:
-        arguments.runs = 1
+        arguments.runs, arguments.large = 1, False
     return arguments
 
 
@@ -97,14 +110,28 @@ def measure_all(programs, arguments, threads):
             say(f"building {name} with {count} thread{'s' if count > 1 else ''}")
             runs.append(
                 {"name": name, "size": size, "texels": texels, "threads": count, "models": models}
-                | build(programs, arguments, models, count)
+                | build(programs, arguments.runs, models, "--threads", count)
             )
+    if arguments.large:
+        runs.append(large(programs, threads[-1]))
     return runs
 
 
-def build(programs, arguments, models, threads):
+def large(programs, threads):
+    """A city in files, of which only some are held at once."""
+    size = LARGE_TRIANGLES
+    options = {"texels_per_triangle": TEXELS, "split": True}
+    city = programs.city("city-large", blocks=LARGE_BLOCKS, triangles=size, **options)
+    name = f"city, {size / 1e6:g} M, {TEXELS} texels, {LARGE_BLOCKS} files"
+    say(f"building {name}")
+    told = {"name": name, "size": size, "texels": TEXELS, "threads": threads, "models": [city]}
+    options = ["--threads", threads, "--max-memory", LARGE_MEMORY]
+    return told | build(programs, 1, [city], *options)
+
+
+def build(programs, runs, models, *options):
     """The median run, with the largest memory of all."""
-    results = [programs.build(models, "--threads", threads) for _ in range(arguments.runs)]
+    results = [programs.build(models, *options) for _ in range(runs)]
     results.sort(key=lambda result: result["seconds"])
     median = results[(len(results) - 1) // 2]
     median["peak_bytes"] = max(result["peak_bytes"] for result in results)
@@ -114,9 +141,35 @@ def build(programs, arguments, models, threads):
 def conditions(arguments):
     return (
         f"Median of {arguments.runs} run{'s' if arguments.runs > 1 else ''} into an empty folder, "
-        "default options, inputs in the page cache, wall time of the whole process. Peak memory is "
-        "the most that the process held in any run. *Texels* is what was written on all levels "
-        "against what the source's triangles use."
+        "default options, inputs in the page cache, wall time of the whole process; that of files "
+        f"with `--max-memory {LARGE_MEMORY}`, and once. Peak memory is the most that the process held "
+        "in any run. *Texels* is what was written on all levels against what the source's triangles use."
+    )
+
+
+def disk_table(programs, runs):
+    """What is read and written, and how long the disk alone would take for it."""
+    reading, writing = bandwidth(programs.work)
+    rows = []
+    for run in runs:
+        report, written = run["report"], run["written"]
+        read = sum(file["bytes"] for model in report["inputs"] for file in model["files"])
+        seconds = read / reading + sum(written) / writing
+        rows.append(
+            [
+                run["name"],
+                f"{read / 1e6:.1f}",
+                f"{sum(written) / 1e6:.1f}",
+                f"{len(written):,}",
+                str(len(report["levels"])),
+                f"{seconds:.2f}",
+                f"{100 * seconds / run['seconds']:.0f} %",
+            ]
+        )
+    head = ["input", "MB read", "MB written", "files", "levels", "disk alone, s", "of the time"]
+    return (
+        f"What is read and written, and what the disk alone would take for it at {reading / 1e6:.0f} "
+        f"MB/s and {writing / 1e6:.0f} MB/s, past the page cache:\n\n" + table(head, rows)
     )
 
 
@@ -171,7 +224,7 @@ def stage_table(runs):
 def scaling(runs, threads):
     """What more threads and more triangles change."""
     lines = []
-    cities = [run for run in runs if run["texels"] == TEXELS]
+    cities = [run for run in runs if run["texels"] == TEXELS and run["size"] != LARGE_TRIANGLES]
     rates = {(run["size"], run["threads"]): triangles(run) / run["seconds"] for run in cities}
     sizes = sorted({run["size"] for run in cities})
     if len(threads) == 2:
@@ -204,7 +257,8 @@ def jpeg_table(programs, arguments, runs):
             texels = int(found.group(2))
             seconds.append(float(found.group(3)))
         alone = statistics.median(seconds)
-        mesh = build(programs, arguments, [untextured(programs, run["models"][0])], run["threads"])
+        bare = [untextured(programs, run["models"][0])]
+        mesh = build(programs, arguments.runs, bare, "--threads", run["threads"])
         rows.append(
             [
                 run["name"],

@@ -83,22 +83,23 @@ class Programs:
         return str(self.target / "release" / name)
 
     def city(self, name, **options):
-        """A generated city, made once for each set of options."""
+        """A generated city, made once for each set of options: a file, or a folder with `split`."""
         arguments = []
         for option, value in options.items():
             arguments.append("--" + option.replace("_", "-"))
             if value is not True:
                 arguments.append(str(value))
         folder = self.work / name
+        made = "city" if options.get("split") else "city.obj"
         made_with = folder / "made-with.txt"
         recipe = " ".join(arguments)
         if not made_with.is_file() or made_with.read_text() != recipe:
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir(parents=True)
             say(f"generating {name}")
-            run([self.path("make-city"), "--quiet", *arguments, str(folder / "city.obj")])
+            run([self.path("make-city"), "--quiet", *arguments, str(folder / made)])
             made_with.write_text(recipe)
-        return folder / "city.obj"
+        return folder / made
 
     def build(self, inputs, *options):
         """Runs hlod-build into a new folder; returns what it took and what came out.
@@ -119,7 +120,14 @@ class Programs:
             subprocess.check_output([self.path("hlod-build"), "inspect", "--json", str(out)])
         )
         peak = report["peak_memory_bytes"]
-        return {"seconds": seconds, "peak_bytes": peak, "report": report, "scene": scene}
+        written = [path.stat().st_size for path in out.rglob("*") if path.is_file()]
+        return {
+            "seconds": seconds,
+            "peak_bytes": peak,
+            "report": report,
+            "scene": scene,
+            "written": written,
+        }
 
 
 def run(command):
