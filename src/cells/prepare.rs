@@ -13,11 +13,14 @@ use super::options::CellOptions;
 use crate::bench::Session;
 use crate::bench::write_beside;
 use crate::format::cells::{CELLS_DIR, CELLS_FILE, Cell, Cells, Face};
-use crate::format::{NodeLabel, file_crc, write_glb};
+use crate::format::{Encoding, NodeLabel, file_crc, write_glb_encoded};
 use crate::{Error, Result};
 
 /// The index is written again after so many cells, so that a run that is killed loses no more.
 const CELLS_BETWEEN: usize = 16;
+
+/// How faces are stored: three quarters of their bytes are vertices and indices otherwise.
+const FORM: Encoding = Encoding { step: None, compress: true };
 
 /// Those corners of a cell from which pictures are taken, from its middle, in halves of its side. From the
 /// others, which are opposite, none is.
@@ -218,11 +221,12 @@ fn cell(
     let made = layers.map(|layers| Made::of(layers, eye));
     let mut faces = Vec::new();
     for (made, direction) in made.into_iter().zip(0..) {
-        let Some(made) = made else { continue };
+        let Some(mut made) = made else { continue };
+        FORM.prepare(&mut made.mesh);
         let [i, j, k] = place;
         let file = format!("c{i}_{j}_{k}-{direction}-{kind}.glb");
         let label = NodeLabel { id: direction, level: 0 };
-        let bytes = write_glb(&made.mesh, session.scene().up, label)?;
+        let bytes = write_glb_encoded(&made.mesh, session.scene().up, label, FORM)?;
         write_beside(&out.join(CELLS_DIR).join(&file), &bytes)?;
         let primitives = &made.mesh.primitives;
         faces.push(Face {

@@ -12,12 +12,22 @@ const SHOWN_WARNINGS: usize = 8;
 
 /// After a build.
 pub fn built(report: &BuildReport, out: &Path) -> String {
+    let rate = report.source_triangles as f64 / report.seconds.max(1e-9);
+    let rate = format!(", {:.0} thousand triangles/s", rate / 1e3);
+    summary(report, out, &rate)
+}
+
+/// After joining subsets, whose triangles were built before.
+pub fn merged(report: &BuildReport, out: &Path) -> String {
+    summary(report, out, "")
+}
+
+fn summary(report: &BuildReport, out: &Path, rate: &str) -> String {
     let mut text = String::new();
     let nodes: u64 = report.levels.iter().map(|level| level.nodes).sum();
     let shared = report.shared_textures;
     let bytes = report.levels.iter().map(|level| level.bytes).sum::<u64>() + shared.bytes;
     let texels = report.levels.iter().map(|level| level.texels).sum::<u64>() + shared.texels;
-    let rate = report.source_triangles as f64 / report.seconds.max(1e-9);
     // Writing to a string cannot fail, hence `let _`.
     let _ = writeln!(
         text,
@@ -57,9 +67,8 @@ pub fn built(report: &BuildReport, out: &Path) -> String {
     }
     let _ = writeln!(
         text,
-        "  {:.2} s, {:.0} thousand triangles/s, peak memory {:.0} MB",
+        "  {:.2} s{rate}, peak memory {:.0} MB",
         report.seconds,
-        rate / 1e3,
         report.peak_memory_bytes as f64 / 1e6
     );
     let _ = writeln!(text, "  {}", orientation(report));

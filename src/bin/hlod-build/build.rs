@@ -331,7 +331,7 @@ pub fn merge(arguments: &MergeArgs) -> Result<()> {
     let report = report?;
     match quiet {
         true => Ok(()),
-        false => print(&build_summary::built(&report, out)),
+        false => print(&build_summary::merged(&report, out)),
     }
 }
 

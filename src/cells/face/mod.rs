@@ -6,6 +6,7 @@ mod parallax_mesh;
 mod parallax_simplify;
 mod patches;
 mod raster;
+mod rounded;
 mod uncovered;
 
 pub(super) use capture::{Capture, DIRECTIONS};
@@ -16,6 +17,7 @@ pub(super) use parallax_mesh::BEHIND_PX;
 use parallax_mesh::ParallaxMesh;
 use parallax_simplify::simplified;
 use patches::patches;
+use rounded::rounded;
 
 use super::options::CellOptions;
 use crate::Result;
@@ -72,7 +74,7 @@ impl Captured {
         let positions = points.iter().map(|&at| self.position(at, &depths, origin, options));
         let texcoord = |(at, &patch): (&[f32; 3], &u32)| {
             let shift = shifts[patch as usize];
-            [0, 1].map(|axis| (at[axis] + shift[axis]) / size[axis] as f32)
+            [0, 1].map(|axis| rounded((at[axis] + shift[axis]) / size[axis] as f32))
         };
         let forward = self.rotation * DVec3::NEG_Z;
         let to_camera = forward.dot(self.eye - origin);
@@ -115,7 +117,7 @@ impl Captured {
         let middle = f64::from(self.picture.width()) / 2.0;
         let [right, down] = [x, y].map(|at| (f64::from(at) - middle) / options.focal_px());
         let from_eye = self.rotation * (DVec3::new(right, -down, -1.0) * metres);
-        (from_eye + (self.eye - origin)).as_vec3()
+        (from_eye + (self.eye - origin)).as_vec3().map(rounded)
     }
 
     /// Steradians in which something is.
