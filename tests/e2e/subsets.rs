@@ -121,7 +121,8 @@ fn a_share_whose_inputs_changed_is_all_that_is_built_again() {
     };
     let worked = ["1-of-2", "2-of-2"].map(|share| built(share) > 0.0);
     assert_eq!(worked.iter().filter(|&&worked| worked).count(), 1, "{worked:?}");
-    run_build(at, &["merge", "out"]);
+    let said = run_build(at, &["merge", "out"]);
+    assert!(!said.contains("triangles/s"), "no triangle was built: {said}");
     assert_eq!(difference(&lasting(&at.join("whole")), &lasting(&at.join("out"))), None);
 }
 

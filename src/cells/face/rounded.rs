@@ -1,7 +1,7 @@
 //! Vertices in fewer bits, which compression then finds.
 
-/// Bits of a coordinate's fraction that are kept. What is rounded moves by less than a hundredth of a pixel of
-/// a face of 512 pixels, wherever it is: both its place and how far it may be off go with the distance.
+/// Bits of a coordinate's fraction that are kept. What is rounded is off by 2^-16 of its distance along each axis at
+/// most, and so by about a hundredth of a pixel of a face of 512 pixels, wherever it is.
 const BITS: u32 = 15;
 
 /// The nearest number to a finite one that has `BITS` bits.
