@@ -34,7 +34,7 @@ pub use find::find_inputs;
 use glam::DVec3;
 
 use crate::cpu_time::CpuTime;
-use crate::mesh::{Model, Part};
+use crate::mesh::{Model, Part, Warnings};
 use crate::{Error, Result};
 
 /// Reads one model file: OBJ, glTF or GLB, by its extension.
@@ -70,13 +70,18 @@ fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
 }
 
+/// Warnings as one line of text.
+fn listed(warnings: &Warnings) -> String {
+    let reasons: Vec<String> =
+        warnings.iter().map(|(what, times)| format!("{what} ({times})")).collect();
+    reasons.join("; ")
+}
+
 /// Brings a model into the form that [`Model`] promises, whatever format it comes from: materials
 /// of different names, groups and textures that are used, dependencies in order.
 fn assemble(mut model: Model) -> Result<Model> {
     if model.parts.is_empty() {
-        let reasons: Vec<String> =
-            model.warnings.iter().map(|(what, times)| format!("{what} ({times})")).collect();
-        let what = format!("no triangle is left: {}", reasons.join("; "));
+        let what = format!("no triangle is left: {}", listed(&model.warnings));
         return Err(Error::input(model.source, what));
     }
     if !model.parts.iter().any(spans_area) {

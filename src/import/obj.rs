@@ -14,6 +14,7 @@
 
 pub(super) mod chunks;
 mod corners;
+pub(super) mod index_faults;
 pub(super) mod statements;
 
 use std::collections::BTreeMap;
@@ -25,6 +26,7 @@ use rustc_hash::FxHashMap;
 
 use self::chunks::Chunks;
 use self::corners::{Run, Triangles};
+use self::index_faults::IndexFaults;
 use self::statements::{Change, MOST_VERTICES, Statements, WHITE};
 use super::clean::{CleanStats, clean};
 use super::lines::not_text;
@@ -163,6 +165,7 @@ struct Obj<'a> {
     dependencies: Vec<PathBuf>,
     warnings: Warnings,
     stats: CleanStats,
+    index_faults: IndexFaults,
 
     library: Library,
     libraries_read: usize,
@@ -208,6 +211,7 @@ impl<'a> Obj<'a> {
             dependencies: vec![path.to_path_buf()],
             warnings: Warnings::default(),
             stats: CleanStats::default(),
+            index_faults: IndexFaults::default(),
             library: Library::default(),
             libraries_read: 0,
             textures: Textures::default(),
@@ -229,7 +233,19 @@ impl<'a> Obj<'a> {
     }
 
     /// Adds the chunks that come next.
-    fn add(&mut self, parsed: Vec<Parsed>, cpu_time: &CpuTime) -> Result<(), String> {
+    fn add(&mut self, mut parsed: Vec<Parsed>, cpu_time: &CpuTime) -> Result<(), String> {
+        let mut before = [self.positions.len(), self.texcoords.len()];
+        let chunk_starts: Vec<[usize; 2]> = parsed
+            .iter()
+            .map(|Parsed { statements, .. }| {
+                let counts = [statements.positions.len(), statements.texcoords.len()];
+                let next = [0, 1].map(|kind| before[kind] + counts[kind]);
+                std::mem::replace(&mut before, next)
+            })
+            .collect();
+        parsed.par_iter_mut().zip(chunk_starts).for_each(|(chunk, before)| {
+            cpu_time.time(|| chunk.statements.settle(&chunk.text, before));
+        });
         let placed: Vec<Placed> = cpu_time
             .time(|| parsed.into_iter().map(|chunk| self.place(chunk)).collect::<Result<_, _>>())?;
         let positions = &self.positions;
@@ -247,9 +263,10 @@ impl<'a> Obj<'a> {
     }
 
     /// Settles what a chunk's indices mean and to which parts its faces belong.
-    fn place(&mut self, Parsed { text, statements: mut chunk }: Parsed) -> Result<Placed, String> {
+    fn place(&mut self, Parsed { statements: mut chunk, .. }: Parsed) -> Result<Placed, String> {
         let before = [self.positions.len(), self.texcoords.len()];
-        chunk.check(&text, before, self.lines)?;
+        chunk.check(before, self.lines)?;
+        self.index_faults.add(&chunk.index_faults, self.lines);
         self.lines += chunk.lines;
         self.stats.add(&chunk.stats);
         if self.colors.len() > 0 || !chunk.colors.is_empty() {
@@ -481,8 +498,12 @@ impl<'a> Obj<'a> {
 
     fn finish(mut self, cpu_time: &CpuTime) -> Result<Model> {
         let line_count = self.lines;
+        self.index_faults.report(self.path, &mut self.warnings);
         if self.parts.is_empty() {
             let what = match (self.positions.len(), self.stats.not_triangles) {
+                _ if !self.warnings.is_empty() => {
+                    format!("no face is left: {}", super::listed(&self.warnings))
+                }
                 (0, 0) => {
                     format!("no vertex and no face in {line_count} lines; expected a Wavefront OBJ")
                 }

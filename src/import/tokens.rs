@@ -79,8 +79,12 @@ fn leading_digits(bytes: &[u8], mut value: u64) -> (u64, usize) {
     (value, length)
 }
 
-/// A corner of a face as written: `v`, `v/vt`, `v//vn` or `v/vt/vn`, each from 1 or, negative,
-/// counted back from the last; 0 stands for an index that is not there.
+/// What an index of 0 is read as: counted back from the last, it is before the first element of any
+/// file. No index has a larger magnitude.
+pub(super) const NO_ELEMENT: i64 = -(1 << 60);
+
+/// A corner of a face: `v`, `v/vt`, `v//vn` or `v/vt/vn`. Each index counts from 1 or, negative,
+/// back from the last; it is 0 where the file gives none and [`NO_ELEMENT`] where the file says 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Corner {
     pub(super) position: i64,
@@ -114,7 +118,7 @@ pub(super) fn corner_at(bytes: &[u8]) -> Option<(Corner, &[u8])> {
     matches!(rest, [] | [..=b' ', ..]).then_some((corner, rest))
 }
 
-/// Reads an integer other than zero from the front of `bytes`; returns it and what follows.
+/// Reads an integer from the front of `bytes`, [`NO_ELEMENT`] for 0; returns it and what follows.
 #[inline]
 fn index(bytes: &[u8]) -> Option<(i64, &[u8])> {
     let (negative, digits) = match bytes {
@@ -125,16 +129,16 @@ fn index(bytes: &[u8]) -> Option<(i64, &[u8])> {
     // What may have wrapped around is larger than any index there can be.
     let value = if length > 18 { beyond(&digits[..length]) } else { value as i64 };
     if value == 0 {
-        return None;
+        return (length > 0).then(|| (NO_ELEMENT, &digits[length..]));
     }
     Some((if negative { -value } else { value }, &digits[length..]))
 }
 
-/// The value of many digits, saturated.
+/// The value of many digits, at most -[`NO_ELEMENT`].
 #[cold]
 fn beyond(digits: &[u8]) -> i64 {
     digits.iter().fold(0, |value: i64, digit| {
-        value.saturating_mul(10).saturating_add(i64::from(digit - b'0'))
+        value.saturating_mul(10).saturating_add(i64::from(digit - b'0')).min(-NO_ELEMENT)
     })
 }
 
@@ -194,8 +198,10 @@ mod tests {
         assert_eq!(read("7/"), Some((7, 0)));
         assert_eq!(read("7//"), Some((7, 0)));
         assert_eq!(read("7/8/"), Some((7, 8)));
-        assert_eq!(read("99999999999999999999999"), Some((i64::MAX, 0)));
-        for text in ["", "0", "7/0", "a", "7/a", "7/8/a", "7/8/9/1", "1.5", "/1", "--1"] {
+        assert_eq!(read("99999999999999999999999"), Some((-NO_ELEMENT, 0)));
+        assert_eq!(read("0/-0/0"), Some((NO_ELEMENT, NO_ELEMENT)));
+        assert_eq!(read("7/00000000000000000000"), Some((7, NO_ELEMENT)));
+        for text in ["", "-", "a", "7/a", "7/-", "7/8/a", "7/8/9/1", "1.5", "/1", "--1"] {
             assert_eq!(read(text), None, "{text}");
         }
     }

@@ -1,11 +1,13 @@
 //! One chunk's statements, without knowing what came before the chunk.
 //!
 //! An index that counts back may reach before the chunk, so it is kept relative to the chunk's
-//! beginning, and how many elements the chunk needs before it is all that is checked later.
+//! beginning, and the parser records how many elements the chunk needs before it. A chunk that
+//! needs more than there are is parsed once more, face by face ([`Statements::settle`]).
 
 use super::super::clean::CleanStats;
 use super::super::lines::{Lines, text};
-use super::super::tokens::{Corner, corner, corner_at, number, plain_decimal_at, word};
+use super::super::tokens::{Corner, NO_ELEMENT, corner, corner_at, number, plain_decimal_at, word};
+use super::index_faults::IndexFaults;
 use crate::color::{srgb_to_linear, unorm16};
 
 /// Most corners of a face: beyond this the ear clipping's own indices could overflow.
@@ -16,8 +18,8 @@ pub(in crate::import) const MOST_VERTICES: usize = u32::MAX as usize - 64;
 
 pub(in crate::import) const WHITE: [u16; 4] = [u16::MAX; 4];
 
-/// Added to indices that are relative to the chunk's beginning; there are fewer elements.
-const RELATIVE: i64 = 1 << 40;
+/// Added to indices that are relative to the chunk's beginning; above twice any other index.
+const RELATIVE: i64 = 1 << 62;
 /// Stands for an index that is not there.
 const ABSENT: i64 = i64::MIN;
 
@@ -33,6 +35,23 @@ impl Reference {
             ABSENT => None,
             from_start if from_start < RELATIVE / 2 => Some(from_start as u32),
             relative => Some((relative - RELATIVE + before as i64) as u32),
+        }
+    }
+
+    /// The index as the file gives it (0 for [`NO_ELEMENT`]) where it means none of the elements:
+    /// `before` precede the chunk and `local` of the chunk precede the face.
+    fn out_of_range(self, before: usize, local: usize) -> Option<i64> {
+        let (before, local) = (before as i64, local as i64);
+        match self.0 {
+            ABSENT => None,
+            from_start if from_start < RELATIVE / 2 => {
+                (from_start >= before + local).then_some(from_start + 1)
+            }
+            relative => {
+                let index = relative - RELATIVE - local;
+                let given = if index == NO_ELEMENT { 0 } else { index };
+                (relative - RELATIVE < -before).then_some(given)
+            }
         }
     }
 }
@@ -59,7 +78,10 @@ pub(in crate::import) struct Statements {
     /// With the number of faces before each.
     pub(in crate::import) changes: Vec<(usize, Change)>,
     /// How many positions and texture coordinates there must be before the chunk.
-    pub(in crate::import) needed: [i64; 2],
+    needed: [i64; 2],
+    /// How many there are, once that is known; then indices out of range are left out.
+    before: Option<[usize; 2]>,
+    pub(in crate::import) index_faults: IndexFaults,
     pub(in crate::import) stats: CleanStats,
     pub(in crate::import) lines: u64,
     /// What cannot be read, and its line from 1; nothing behind it was read.
@@ -68,15 +90,30 @@ pub(in crate::import) struct Statements {
 
 impl Statements {
     pub(super) fn of(chunk: &[u8]) -> Self {
-        let mut result = Self::default();
+        Self::parse(chunk, None)
+    }
+
+    /// Parses the chunk, of this text, once more where an index is out of range, now that it is
+    /// known how many positions and texture coordinates come before it. A face whose position is
+    /// out of range is left out; one whose texture coordinate is loses all of them.
+    pub(in crate::import) fn settle(&mut self, text: &[u8], before: [usize; 2]) {
+        if (0..2).any(|kind| self.needed[kind] > before[kind] as i64) {
+            *self = Self::parse(text, Some(before));
+        }
+    }
+
+    fn parse(chunk: &[u8], before: Option<[usize; 2]>) -> Self {
+        let mut result = Self { before, ..Self::default() };
         let mut lines = Lines::new(chunk);
         loop {
-            while let Some(rest) = result.common(lines.rest()) {
+            while before.is_none()
+                && let Some(rest) = result.common(lines.rest())
+            {
                 lines.go_on_at(rest);
             }
             // Bytes in memory can always be read.
             let Ok(Some((line, statement))) = lines.next() else { break };
-            if let Err(what) = result.statement(statement) {
+            if let Err(what) = result.statement(statement, line) {
                 result.problem = Some((line, what));
                 break;
             }
@@ -85,21 +122,15 @@ impl Statements {
         result
     }
 
-    /// Refuses a chunk, of this text, that means what is not there or cannot be read, where so many
-    /// positions and texture coordinates and so many lines come before it.
+    /// Refuses a chunk that cannot be read, where so many positions and texture coordinates and so
+    /// many lines come before it.
     pub(in crate::import) fn check(
         &mut self,
-        text: &[u8],
         before: [usize; 2],
         lines: u64,
     ) -> Result<(), String> {
-        let at_line = |(line, what): (u64, String)| format!("line {}: {what}", lines + line);
-        if (0..2).any(|kind| self.needed[kind] > before[kind] as i64) {
-            let missing = first_missing(text, before);
-            return Err(missing.map_or_else(|| "an index is out of range".to_owned(), at_line));
-        }
-        if let Some(problem) = self.problem.take() {
-            return Err(at_line(problem));
+        if let Some((line, what)) = self.problem.take() {
+            return Err(format!("line {}: {what}", lines + line));
         }
         if before[0] + self.positions.len() > MOST_VERTICES
             || before[1] + self.texcoords.len() > MOST_VERTICES
@@ -158,13 +189,14 @@ impl Statements {
         }
     }
 
-    fn statement(&mut self, statement: &[u8]) -> Result<(), String> {
+    /// Reads a statement that begins in this line of the chunk.
+    fn statement(&mut self, statement: &[u8], line: u64) -> Result<(), String> {
         let mut rest = statement;
         let name = |rest| text(rest).trim().to_owned();
         let change = match word(&mut rest) {
             Some(b"v") => return self.position(rest),
             Some(b"vt") => return self.texcoord(rest),
-            Some(b"f" | b"fo") => return self.face(rest),
+            Some(b"f" | b"fo") => return self.face(rest, line),
             Some(b"o" | b"g") => Change::Group(name(rest)),
             Some(b"usemtl") => Change::Material(name(rest)),
             Some(b"mtllib") => Change::Libraries(name(rest)),
@@ -231,12 +263,17 @@ impl Statements {
         Ok(())
     }
 
-    fn face(&mut self, rest: &[u8]) -> Result<(), String> {
+    fn face(&mut self, mut rest: &[u8], line: u64) -> Result<(), String> {
         let first = self.corners.len();
-        for_corners(rest, |corner| {
+        while let Some(word) = word(&mut rest) {
+            if word[0] == b'#' {
+                break;
+            }
+            let corner = corner(word).ok_or_else(|| {
+                format!("face corner \"{}\"; expected v, v/vt, v//vn or v/vt/vn", text(word))
+            })?;
             self.corner(corner);
-            Ok(())
-        })?;
+        }
         let count = self.corners.len() - first;
         if count > MOST_CORNERS {
             return Err(format!("face of {count} corners; expected at most {MOST_CORNERS}"));
@@ -244,10 +281,34 @@ impl Statements {
         if count < 3 {
             self.stats.not_triangles += 1;
             self.corners.truncate(first);
-        } else {
+        } else if self.settle_face(first, line) {
             self.faces.push(count as u32);
         }
         Ok(())
+    }
+
+    /// Once it is known what comes before the chunk: leaves out of the face, whose corners begin at
+    /// `first`, what is out of range. Returns false where nothing is left of it.
+    fn settle_face(&mut self, first: usize, line: u64) -> bool {
+        let Some(before) = self.before else { return true };
+        let local = [self.positions.len(), self.texcoords.len()];
+        let face = &mut self.corners[first..];
+        let mut is_faulty = |kind: usize, face: &[[Reference; 2]]| {
+            let fault =
+                face.iter().find_map(|corner| corner[kind].out_of_range(before[kind], local[kind]));
+            if let Some(index) = fault {
+                self.index_faults.count(kind, line, index, before[kind] + local[kind]);
+            }
+            fault.is_some()
+        };
+        if is_faulty(0, face) {
+            self.corners.truncate(first);
+            return false;
+        }
+        if is_faulty(1, face) {
+            face.iter_mut().for_each(|[_, texcoord]| *texcoord = Reference(ABSENT));
+        }
+        true
     }
 
     #[inline]
@@ -270,61 +331,6 @@ impl Statements {
         };
         self.corners.push([position, texcoord]);
     }
-}
-
-/// Visits a face's corners.
-fn for_corners(
-    mut rest: &[u8],
-    mut visit: impl FnMut(Corner) -> Result<(), String>,
-) -> Result<(), String> {
-    while let Some(word) = word(&mut rest) {
-        if word[0] == b'#' {
-            break;
-        }
-        let corner = corner(word).ok_or_else(|| {
-            format!("face corner \"{}\"; expected v, v/vt, v//vn or v/vt/vn", text(word))
-        })?;
-        visit(corner)?;
-    }
-    Ok(())
-}
-
-/// The first corner of a chunk, with its line from 1, that means an element that is not there,
-/// where so many positions and texture coordinates come before the chunk.
-fn first_missing(chunk: &[u8], before: [usize; 2]) -> Option<(u64, String)> {
-    let [mut positions, mut texcoords] = before;
-    let mut lines = Lines::new(chunk);
-    while let Ok(Some((line, statement))) = lines.next() {
-        let mut rest = statement;
-        match word(&mut rest) {
-            Some(b"v") => positions += 1,
-            Some(b"vt") => texcoords += 1,
-            Some(b"f" | b"fo") => {
-                let missing = for_corners(rest, |corner| {
-                    check(corner.position, positions, "vertex")?;
-                    match corner.texcoord {
-                        0 => Ok(()),
-                        index => check(index, texcoords, "texture coordinate"),
-                    }
-                });
-                if let Err(what) = missing {
-                    return Some((line, what));
-                }
-            }
-            _ => {}
-        }
-    }
-    None
-}
-
-/// Refuses an index, from 1 or counted back from the last, that is beyond `count` elements.
-fn check(index: i64, count: usize, what: &str) -> Result<(), String> {
-    if index.unsigned_abs() > count as u64 {
-        return Err(format!(
-            "{what} index {index} of {count}; expected 1 to {count}, or -{count} to -1"
-        ));
-    }
-    Ok(())
 }
 
 /// Plain decimals at the front of `text`, each followed by white space or the end.

@@ -269,19 +269,84 @@ fn where_nothing_is_left_the_file_is_refused() {
 fn errors_name_the_line() {
     let line_7 = |line: &str| refusal(format!("# square\n\n{SQUARE}{line}\nf 1 2 3\n"));
     for (line, expected) in [
-        ("f 1 2 9", "line 7: vertex index 9 of 4; expected 1 to 4, or -4 to -1"),
-        ("f 1 2 -5", "line 7: vertex index -5 of 4; expected 1 to 4, or -4 to -1"),
-        ("f 1/1 2/1 3/1", "line 7: texture coordinate index 1 of 0; expected 1 to 0, or -0 to -1"),
-        ("f 1 2 0", "line 7: face corner \"0\"; expected v, v/vt, v//vn or v/vt/vn"),
         ("f 1 2 x", "line 7: face corner \"x\"; expected v, v/vt, v//vn or v/vt/vn"),
+        ("f 1 2 9\nf 1 2 3 x", "line 8: face corner \"x\"; expected v, v/vt, v//vn or v/vt/vn"),
         ("v 1 2", "line 7: vertex of 2 coordinates; expected 3"),
         ("v 1 2 z", "line 7: vertex coordinate \"z\"; expected a number"),
         ("vt u", "line 7: texture coordinate \"u\"; expected a number"),
         ("vt", "line 7: texture coordinate without a value; expected u and v"),
-        ("f 1 \\\n 2 9", "line 7: vertex index 9 of 4; expected 1 to 4, or -4 to -1"),
     ] {
         assert_eq!(line_7(line), expected);
     }
+}
+
+#[test]
+fn faces_with_a_position_out_of_range_are_dropped() {
+    for (face, index) in [
+        ("f 1 2 9", "9"),
+        ("f 1 2 -5", "-5"),
+        ("f 0 1 2", "0"),
+        ("f 1 2 -0", "0"),
+        ("f 1/1 2/1 3/1 7/1", "7"),
+        ("f 1 \\\n 2 99999999999999999999", "1152921504606846976"),
+        ("f 1 2 4611686018427387904", "1152921504606846976"),
+        ("f 1 2 -1099511627776", "-1099511627776"),
+    ] {
+        let obj = format!("# square\n\n{SQUARE}{face}\nf 1 2 3\n{face}\n");
+        let model = read(&obj, &[]).unwrap();
+        assert_eq!(model.parts[0].indices, [0, 1, 2], "{face}");
+        let expected = format!(
+            "vertex index that is 0 or out of range, face dropped (first in line 7: {index} of 4 \
+             vertices)"
+        );
+        assert_eq!(warnings(&model)[0], (expected, 2));
+        check_chunks(&folder_with(&[]), obj.as_bytes());
+    }
+    let nothing = refusal(format!("{SQUARE}f 1 2 9\nf 0 0 0\n"));
+    assert!(nothing.contains("no face"), "{nothing}");
+    assert!(nothing.contains("(first in line 5: 9 of 4 vertices) (2)"), "{nothing}");
+}
+
+#[test]
+fn faces_with_a_texture_coordinate_out_of_range_lose_it_alone() {
+    let files = [("a.mtl", "newmtl t\nmap_Kd t.png\n"), ("t.png", "")];
+    let model = |faces: &str| {
+        let obj = format!("mtllib a.mtl\n{SQUARE}vt 0.5 0.25\nvt 1 1\nusemtl t\n{faces}");
+        check_chunks(&folder_with(&files), obj.as_bytes());
+        read(&obj, &files).unwrap()
+    };
+    for (face, first) in [
+        ("f 1/0 2/1 3/1 4/1", Some(0)),
+        ("f 1/0/0 2/0/0 3/0/0 4/0/0", Some(0)),
+        ("f 1/1 2/3 3/1 4/1", Some(3)),
+        ("f 1/-3 2/1 3/1 4/1", Some(-3)),
+        ("f 1/1/0 2/1/0 3/1/0 4/1/0", None),
+        ("f 1/1/9 2/1/-7 3/1/0 4/1", None),
+    ] {
+        let model = model(&format!("{face}\n"));
+        assert_eq!(model.triangle_count(), 2, "{face}");
+        let texcoord = if first.is_some() { [0.0, 0.0] } else { [0.5, 0.75] };
+        assert!(model.parts[0].texcoords.iter().all(|at| *at == texcoord), "{face}");
+        let warned = first.map(|index| {
+            let what = "texture coordinate index that is 0 or out of range, the face's texture \
+                        coordinates dropped";
+            (format!("{what} (first in line 9: {index} of 2 texture coordinates)"), 1)
+        });
+        assert_eq!(warnings(&model).into_iter().next(), warned, "{face}");
+    }
+    let both = model("f 1/1 2/1 3/1\nf 1/1 3/9 4/1\n");
+    let textured = |vertex: &&u32| both.parts[0].texcoords[**vertex as usize] == [0.5, 0.75];
+    assert_eq!(both.parts[0].indices.iter().filter(textured).count(), 3);
+}
+
+#[test]
+fn texture_coordinates_that_the_file_does_not_have_are_dropped_from_all_faces() {
+    let obj = format!("{SQUARE}f 1/1/1 2/2/2 3/3/3 4/4/4\nf -1/-1 -2/-2 -3/-3\n");
+    let model = read(&obj, &[]).unwrap();
+    assert_eq!(model.triangle_count(), 3);
+    assert_eq!(warnings(&model)[0].1, 2, "{:?}", model.warnings);
+    assert_eq!(model.warnings.iter().count(), 1, "one warning for a file");
+    check_chunks(&folder_with(&[]), obj.as_bytes());
 }
 
 #[test]
@@ -464,7 +529,7 @@ fn where_chunks_end_makes_no_difference() {
         b"f 9 2 1\n",
         b"f 1 2\n",
         b"f 1 2 x\n",
-        b"f 1 1/9 2\n",
+        b"f 1 1/9 2/0\n",
         b"g a\n",
         b"g b\n",
         b"o\n",

@@ -24,16 +24,13 @@ impl Bodies {
         self.parents.extend(self.parents.len() as u32..vertices as u32);
     }
 
-    /// Joins what the faces of a chunk have in common, of which all vertices are known; so many come before it.
+    /// Joins what the faces of a settled chunk have in common; so many vertices come before it.
     pub fn join_faces(&mut self, chunk: &Statements, before: usize) {
         let mut corners = chunk.corners.iter().map(|[position, _]| position.resolve(before));
         for &count in &chunk.faces {
             let mut first = None;
             for corner in corners.by_ref().take(count as usize) {
-                // What is not there is refused when the file is divided.
-                let Some(corner) = corner.filter(|at| (*at as usize) < self.parents.len()) else {
-                    continue;
-                };
+                let Some(corner) = corner else { continue };
                 let first = *first.get_or_insert(corner);
                 let (one, other) = (self.root(first), self.root(corner));
                 self.parents[one.max(other) as usize] = one.min(other);

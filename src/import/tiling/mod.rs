@@ -27,7 +27,8 @@ use super::bounds::fold_vertices;
 use super::clean::CleanStats;
 use super::find::{Kind, kind};
 use super::obj::chunks::Chunks;
-use super::obj::statements::{Change, Statements, WHITE};
+use super::obj::index_faults::IndexFaults;
+use super::obj::statements::{Change, MOST_VERTICES, Statements, WHITE};
 use super::obj::{BYTE_ORDER_MARK, Batch, CHUNK_BYTES, Parsed, load_part, text_of};
 use crate::bytes::Bytes;
 use crate::cpu_time::CpuTime;
@@ -119,6 +120,10 @@ impl Tiling {
         each_chunk(path, cpu_time, |chunk| tiler.add(chunk).map_err(fault))?;
         let tiling = tiler.finish().map_err(unwritable)?;
         match tiling.tiles.is_empty() {
+            true if !tiling.warnings.is_empty() => {
+                let what = format!("no face is left: {}", super::listed(&tiling.warnings));
+                Err(Error::input(path, what))
+            }
             true => Err(Error::input(path, "no face; expected at least one")),
             false => Ok(tiling),
         }
@@ -235,6 +240,7 @@ struct Tiler<'a> {
     belongs: Belongs,
     triangulator: Triangulator,
     stats: CleanStats,
+    index_faults: IndexFaults,
     lines: u64,
 }
 
@@ -258,13 +264,16 @@ impl<'a> Tiler<'a> {
             belongs: Belongs::default(),
             triangulator: Triangulator::default(),
             stats: CleanStats::default(),
+            index_faults: IndexFaults::default(),
             lines: 0,
         })
     }
 
     /// Joins what the faces of the next chunk have in common, and keeps its vertices.
-    fn join(&mut self, Parsed { statements: mut chunk, .. }: Parsed) -> Result<(), Fault> {
+    fn join(&mut self, Parsed { text, statements: mut chunk }: Parsed) -> Result<(), Fault> {
+        // Texture coordinates do not matter here.
         let before = self.positions.len();
+        chunk.settle(&text, [before, MOST_VERTICES]);
         self.positions.extend(std::mem::take(&mut chunk.positions))?;
         self.bodies.grow(self.positions.len());
         self.bodies.join_faces(&chunk, before);
@@ -281,7 +290,9 @@ impl<'a> Tiler<'a> {
     /// Adds the next chunk.
     fn add(&mut self, Parsed { text, statements: mut chunk }: Parsed) -> Result<(), Fault> {
         let before = [self.placed, self.texcoords.len()];
-        chunk.check(&text, before, self.lines).map_err(Fault::Text)?;
+        chunk.settle(&text, before);
+        chunk.check(before, self.lines).map_err(Fault::Text)?;
+        self.index_faults.add(&chunk.index_faults, self.lines);
         self.lines += chunk.lines;
         self.stats.add(&chunk.stats);
         if self.colors.len() > 0 || !chunk.colors.is_empty() {
@@ -383,6 +394,7 @@ impl<'a> Tiler<'a> {
             tile.flush(&self.names, &self.file, &mut self.end)?;
         }
         let mut warnings = Warnings::default();
+        self.index_faults.report(self.path, &mut warnings);
         self.stats.report(self.path, &mut warnings);
         let mut tiles = self.tiles;
         tiles.retain(|tile| !tile.pieces.is_empty());

@@ -197,7 +197,9 @@ fn what_is_wrong_is_told_as_of_the_whole_file() {
             .to_string()
     };
     let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
-    assert!(said(&format!("{corners}f 1 2 3\nf 1 2 4\n")).contains("line 5: vertex index 4 of 3"));
+    assert!(
+        said(&format!("{corners}f 1 2 3\nf 1 2\nf 1 x 3\n")).contains("line 6: face corner \"x\"")
+    );
     assert!(said(&format!("{corners}v 1 x 0\n")).contains("line 4: vertex coordinate \"x\""));
     assert!(said("\0").contains("not a text file"));
     let said = said(corners);
@@ -208,14 +210,20 @@ fn what_is_wrong_is_told_as_of_the_whole_file() {
 fn what_is_imperfect_is_counted_once() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("odd.obj");
-    let odd = "v nan 0 0\nf 1 2 -1\nl 1 2\nv 678000 5403000 1 2 0 0\n";
+    let odd = "v nan 0 0\nf 1 2 -1\nl 1 2\nv 678000 5403000 1 2 0 0\nf 1 2 999999\nf 1/0 2/0 4/0\n";
     fs::write(&path, format!("{}{odd}", hills(20))).unwrap();
     let count = |model: Model, what: &str| -> u64 {
         model.warnings.iter().filter(|(text, _)| text.contains(what)).map(|(_, times)| times).sum()
     };
     let tiling = tiled(&path, 100).unwrap();
     let load = |tile| tiling.load(tile, &CpuTime::default()).unwrap();
-    for what in ["not finite, dropped", "free-form element", "colour outside"] {
+    for what in [
+        "not finite, dropped",
+        "free-form element",
+        "colour outside",
+        "vertex index that is 0 or out of range",
+        "texture coordinate index that is 0 or out of range",
+    ] {
         let in_tiles: u64 = (0..tiling.tiles()).map(|tile| count(load(tile), what)).sum();
         let whole = count(super::super::load(&path).unwrap(), what);
         assert_eq!((in_tiles, whole), (1, 1), "{what}");
