@@ -8,11 +8,15 @@
 //! perhaps `roll_deg`, or a target `tx,ty,tz`; [`from_angles`](super::from_angles) and
 //! [`looking_at`](super::looking_at) say what they mean. `fov_y_deg` may be left out. Spaces
 //! around fields, empty lines and lines that begin with `#` are passed over.
+//!
+//! `time_s` is in seconds from any origin, and never falls. Stamps that look like milliseconds,
+//! microseconds or nanoseconds are refused.
 
 mod columns;
 mod read;
 #[cfg(test)]
 mod tests;
+mod time_unit;
 mod write;
 
 pub use read::{parse_path, read_path};

@@ -19,6 +19,6 @@ pub use make::{
     DEFAULT_FPS, DRIVE_M_S, Ground, MAX_TURN_DEG_S, PathKind, SHAKE_PERIOD_S, SHAKE_SWAY_M,
     SHAKE_TURN_DEG, WALK_M_S, eyes_over, make_path, street_eyes,
 };
-pub use path::{CameraPath, PathFrame};
+pub use path::{CameraPath, LONGEST_INTERVAL_S, LongGaps, PathFrame};
 pub use pose::Pose;
 pub use view::View;

@@ -9,6 +9,7 @@ use glam::{DQuat, DVec3};
 
 use super::DEFAULT_FOV_Y_DEG;
 use super::columns::{Columns, Orientation, shown};
+use super::time_unit::check_seconds;
 use crate::camera::{CameraPath, PathFrame, Pose, from_angles, looking_at};
 use crate::mesh::UpAxis;
 use crate::{Error, Result};
@@ -50,17 +51,23 @@ fn parse(text: impl Read, up: UpAxis) -> Result<CameraPath, String> {
     let names = header_names(&record).map_err(|what| format!("line {header}: {what}"))?;
     let columns = Columns::new(names).map_err(|what| format!("line {header}: {what}"))?;
     let mut frames: Vec<PathFrame> = Vec::new();
+    let mut lines = Vec::new();
     while next(&mut reader, &mut record)? {
         let row = Row { columns: &columns, record: &record };
-        let frame = row
-            .frame(up, frames.last())
-            .map_err(|what| format!("line {}: {what}", line_of(&reader, &record)))?;
+        let line = line_of(&reader, &record);
+        let frame = row.frame(up, frames.last()).map_err(|what| format!("line {line}: {what}"))?;
         frames.push(frame);
+        lines.push(line);
     }
-    match frames.is_empty() {
-        true => Err("expected a row for each frame after the header, found none".to_owned()),
-        false => Ok(CameraPath { frames }),
+    if frames.is_empty() {
+        return Err("expected a row for each frame after the header, found none".to_owned());
     }
+    let stamps: Vec<f64> = frames.iter().map(|frame| frame.time_s).collect();
+    check_seconds(&stamps).map_err(|wrong| {
+        let (line, column) = (lines[wrong.row], columns.time + 1);
+        format!("line {line}: column {column} (time_s): expected seconds, found {}", wrong.found)
+    })?;
+    Ok(CameraPath { frames })
 }
 
 /// Reads the next line that is not blank; false at the end.
