@@ -7,6 +7,7 @@ use super::margin::Margin;
 use super::predict::predict;
 use super::settling::Settling;
 use super::steady::Steady;
+use super::uploads::Uploads;
 use super::{
     Backend, CostModel, CoveredParts, FarField, FarFieldMode, FarShown, FrameEstimate, FrameInput,
     FrameOutcome, FrameReport, FrontCheck, FrontLoad, HiddenNodes, Inspect, Load, Occluders,
@@ -80,6 +81,7 @@ pub struct Engine<'a> {
     backend: &'a mut dyn Backend,
     costs: CostModel,
     choosing: Choosing,
+    uploads: Uploads,
     margin: Margin,
     settling: Settling,
     front_load: FrontLoad,
@@ -108,14 +110,6 @@ pub struct Engine<'a> {
     frames: u64,
     levels: usize,
     start_bytes: u64,
-}
-
-/// Of the target, so much is for uploads however long drawing takes: what comes may be what takes less.
-const LEAST_FOR_UPLOADS: f64 = 0.08;
-
-/// What these bytes add to a frame that uploads them.
-fn uploading_ms(costs: &CostModel, uploaded_bytes: f64) -> f64 {
-    costs.added_ms(&Load { uploaded_bytes, ..Load::default() })
 }
 
 /// Locks; a thread that died while it held the lock is an error of ours.
@@ -156,6 +150,7 @@ impl<'a> Engine<'a> {
                 least_ms: 0.0,
                 dt_s: 0.0,
             },
+            uploads: Uploads::new(costs.prices().uploaded_byte),
             policy,
             residency,
             backend,
@@ -221,10 +216,16 @@ impl<'a> Engine<'a> {
             )));
         }
         self.before.clone_from(&self.selection.front);
-        let mut report = FrameReport::default();
+        let without_scene = !self.seen.tree.is_in_view(view);
+        let mut report = FrameReport { without_scene, ..FrameReport::default() };
 
         let changes = self.begin_frame(&mut report)?;
         report.upload_ms = self.backend.apply(&changes)?;
+        self.uploads.observe(changes.arrived_bytes, report.upload_ms, self.seen.dt_s);
+        if !self.settling.has_ended() {
+            // Frames of the loading phase are late whatever they draw, and not like those after it.
+            self.uploads.forget_frames();
+        }
         self.hold_occlusion(&changes);
         let seen = &mut self.seen;
         predict(self.pose.as_ref(), view, seen.dt_s, &mut seen.predicted);
@@ -234,8 +235,8 @@ impl<'a> Engine<'a> {
         seen.covered.begin_frame(seen.tree.len());
         let is_still =
             changes.arrived.is_empty() && self.pose == Some(view.pose) && self.margin.is_known();
-        let choosing_ms = self.choosing.expected_ms();
-        seen.steady.follow(&self.costs, choosing_ms, self.margin.ratio(), &self.load, is_still);
+        let beside_ms = self.choosing.expected_ms() + self.uploads.reserve_ms(seen.target_ms);
+        seen.steady.follow(&self.costs, beside_ms, self.margin.ratio(), &self.load, is_still);
 
         let before = self.backend.now_ms();
         self.choose(view);
@@ -354,16 +355,14 @@ impl<'a> Engine<'a> {
         Ok(changes)
     }
 
-    /// What there is time to upload beside what the frame before drew. All that there is until the first view is
-    /// in memory.
+    /// Bytes that there is time to upload beside what the frame before drew; any number until the
+    /// first view is in memory.
     fn upload_bytes(&self) -> u64 {
         if !self.settling.has_ended() {
             return u64::MAX;
         }
-        let target_ms = self.seen.target_ms;
         let drawing_ms = self.choosing.expected_ms() + self.costs.estimate(&self.load).mean_ms;
-        let left_ms = (target_ms - drawing_ms).max(LEAST_FOR_UPLOADS * target_ms);
-        (left_ms / uploading_ms(&self.costs, 1e6) * 1e6) as u64
+        self.uploads.limit_bytes(self.seen.target_ms, drawing_ms)
     }
 
     /// Knows what the nodes in memory hide, and of no others.
@@ -398,12 +397,12 @@ impl<'a> Engine<'a> {
         });
         report.estimated_ms = estimate.ms;
         report.estimated_without_feedback_ms = estimate.without_feedback_ms;
-        if self.settling.is_over(report.arrived, report.waiting, dt_s) {
+        report.loading_phase = !self.settling.is_over(report.arrived, report.waiting, dt_s);
+        if !report.loading_phase {
             let expected_ms = choosing_ms + costs.priced_ms(&drawn);
             let frame_ms = steady.frame_ms(target_ms, least_ms);
-            // Uploads take what drawing leaves: they are no reason to draw less.
-            let uploading_ms = uploading_ms(costs, changes.arrived_bytes as f64);
-            self.margin.observe(expected_ms, report.frame_ms - uploading_ms, frame_ms, dt_s);
+            // Time for uploads is kept free apart from this.
+            self.margin.observe(expected_ms, report.actual_ms, frame_ms, dt_s);
         }
         costs.observe(&whole, report.frame_ms - report.select_ms, report.gpu_ms, dt_s);
         self.choosing.observe(report.select_ms, dt_s);

@@ -47,8 +47,8 @@ const RANGE: [f64; 2] = [0.5, 2.0];
 
 /// Compares what frames took with what their prices come to.
 ///
-/// Whatever the cost model has no term for counts. What uploads take does not: they are bounded by what
-/// drawing leaves. By the frames of the last twenty seconds, of those which are expected to take the
+/// Whatever the cost model has no term for counts. What uploads take does not: time for them is kept free
+/// apart ([`Uploads`](super::uploads::Uploads)). By the frames of the last twenty seconds, of those which are expected to take the
 /// target over `ratio` 84 of 100 will keep to it, and 98 will be late by less than a tenth of it.
 /// Quantiles rather than deviations, since times have long tails: a stall of a second would otherwise
 /// cost detail for as long as it is remembered.

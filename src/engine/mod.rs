@@ -27,6 +27,7 @@ mod steady;
 #[cfg(test)]
 pub(crate) mod test_frame;
 mod toggle_causes;
+mod uploads;
 mod visibility;
 
 pub use backend::{Backend, Drawn, Inspect};

@@ -25,6 +25,11 @@ pub struct FrameReport {
     pub modelled_ms: f64,
     /// Standard deviation of that.
     pub modelled_deviation_ms: f64,
+    /// The frame belongs to the loading phase: no frame yet, from the first drawn on, needed nothing
+    /// that was not in memory. The phase ends after two seconds at the latest.
+    pub loading_phase: bool,
+    /// The view does not show the scene: [`SceneTree::is_in_view`](crate::runtime::SceneTree::is_in_view).
+    pub without_scene: bool,
     /// What the policy says of itself, by [`Policy::diagnostics`](super::Policy::diagnostics).
     pub diagnostics: Vec<f64>,
     /// Nodes that gave way to their children.

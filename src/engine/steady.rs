@@ -16,22 +16,22 @@ const KEPT_STILL: f64 = 0.05;
 /// graphics card with a target of 8 ms, three nodes were drawn in 3 ms.
 const LEAST_LEFT: f64 = 0.5;
 
-/// Prices, what choosing takes beside them, and how much longer than by both frames take, as they were
-/// when they last changed by more than noise does.
+/// Prices, what choosing and uploads take beside them, and how much longer than by both frames take, as they
+/// were when they last changed by more than noise does.
 ///
 /// They change together, by what they come to for what the last frame drew. Noise that raises a price
 /// lowers the rest that the price does not explain, so that both together are steadier than each.
 #[derive(Clone, Debug)]
 pub(super) struct Steady {
     costs: CostModel,
-    choosing_ms: f64,
+    beside_ms: f64,
     ratio: f64,
 }
 
 impl Steady {
     /// Before any frame.
     pub fn new(costs: &CostModel, ratio: f64) -> Self {
-        Self { costs: costs.clone(), choosing_ms: 0.0, ratio }
+        Self { costs: costs.clone(), beside_ms: 0.0, ratio }
     }
 
     /// The cost model to choose by.
@@ -45,30 +45,30 @@ impl Steady {
     /// which drawing takes at least, no more than a part is given up for frames that are late for other
     /// reasons.
     pub fn frame_ms(&self, target_ms: f64, least_ms: f64) -> f64 {
-        let least_ms = self.choosing_ms + least_ms;
+        let least_ms = self.beside_ms + least_ms;
         (target_ms / self.ratio).max(least_ms + (target_ms - least_ms).max(0.0) * LEAST_LEFT)
     }
 
-    /// What drawing may be expected to take of it; 0 where choosing takes all of it.
+    /// What drawing may be expected to take of it; 0 where choosing and uploads take all of it.
     pub fn budget_ms(&self, target_ms: f64, least_ms: f64) -> f64 {
-        (self.frame_ms(target_ms, least_ms) - self.choosing_ms).max(0.0)
+        (self.frame_ms(target_ms, least_ms) - self.beside_ms).max(0.0)
     }
 
-    /// Compares with the prices, what choosing takes and the ratio of now, for what the last frame drew,
+    /// Compares with the prices, what choosing and uploads take and the ratio of now, for what the last frame drew,
     /// `drawn`.
     pub fn follow(
         &mut self,
         costs: &CostModel,
-        choosing_ms: f64,
+        beside_ms: f64,
         ratio: f64,
         drawn: &Load,
         is_still: bool,
     ) {
-        let kept_ms = (self.costs.priced_ms(drawn) + self.choosing_ms) * self.ratio;
-        let more = (costs.priced_ms(drawn) + choosing_ms) * ratio / kept_ms - 1.0;
+        let kept_ms = (self.costs.priced_ms(drawn) + self.beside_ms) * self.ratio;
+        let more = (costs.priced_ms(drawn) + beside_ms) * ratio / kept_ms - 1.0;
         let least = if is_still { -KEPT_STILL } else { -KEPT };
         if !(least..=KEPT).contains(&more) {
-            *self = Self { costs: costs.clone(), choosing_ms, ratio };
+            *self = Self { costs: costs.clone(), beside_ms, ratio };
         }
     }
 }
@@ -139,8 +139,8 @@ mod tests {
     fn what_choosing_takes_is_not_left_for_drawing() {
         let costs = CostModel::new(&triangles_alone(0.1));
         let mut steady = Steady::new(&costs, 1.0);
-        let mut budget_of = |choosing_ms| {
-            steady.follow(&costs, choosing_ms, 1.25, &DRAWN, false);
+        let mut budget_of = |beside_ms| {
+            steady.follow(&costs, beside_ms, 1.25, &DRAWN, false);
             [0.0, 15.0].map(|least_ms| steady.budget_ms(30.0, least_ms))
         };
         assert_eq!(budget_of(4.0), [20.0, 20.5], "half of what is left of 30 ms by 4 and 15");

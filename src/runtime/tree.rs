@@ -45,6 +45,10 @@ pub struct TreeNode {
     pub children: Range<u32>,
 }
 
+/// A view shows the scene if the boxes of its roots cover at least this part of the image: 10 × 9
+/// pixels of 1280 × 720. Less tells nothing of how the scene is drawn.
+const LEAST_COVERED: f64 = 1e-4;
+
 /// The hierarchy as selection needs it.
 ///
 /// Nodes are known by their index in the scene; their *places* are breadth-first, roots first.
@@ -174,6 +178,17 @@ impl SceneTree {
         view.pixels_per_metre() / distance
     }
 
+    /// Whether a view shows the scene: the boxes of its roots cover at least a ten-thousandth of
+    /// the image.
+    pub fn is_in_view(&self, view: &View) -> bool {
+        let mut covered = 0.0;
+        let (_, roots) = self.at(self.root_places());
+        roots.iter().any(|root| {
+            covered += view.frustum.covered(root.bbox);
+            covered >= LEAST_COVERED
+        })
+    }
+
     /// Metres of the nearest that is drawn: a hand's breadth, and less in scenes of a few metres.
     pub fn near_plane(&self) -> f32 {
         ((self.diagonal() * 1e-4) as f32).clamp(1e-6, 0.1)
@@ -189,6 +204,11 @@ impl SceneTree {
         self.diagonal
     }
 
+    /// Least and greatest coordinates of the box around everything.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        self.bounds
+    }
+
     /// The middle of that box.
     pub fn middle(&self) -> DVec3 {
         (self.bounds[0] + self.bounds[1]) / 2.0
@@ -202,7 +222,25 @@ fn draws(node: &Node) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use crate::runtime::test_tree::{sketch, tree};
+    use glam::DVec3;
+
+    use crate::camera::{Pose, View};
+    use crate::runtime::test_tree::{sketch, tree, view};
+
+    #[test]
+    fn a_scene_is_in_view_unless_it_is_beside_behind_or_too_far_away() {
+        // A cube of 2 m; the camera looks along x, 90° high.
+        let tree = tree(vec![sketch([0.0; 3], 1.0, vec![])]);
+        let shows = |eye: [f64; 3]| {
+            let pose = Pose { position: DVec3::from_array(eye), ..view().pose };
+            tree.is_in_view(&View::new(pose, DVec3::ZERO, [1280, 720]))
+        };
+        assert!(shows([0.0; 3]), "from within");
+        assert!(shows([-20.0, 0.0, 0.0]) && shows([-50.0, 0.0, 0.0]));
+        for eye in [[20.0, 0.0, 0.0], [-20.0, 90.0, 0.0], [-200.0, 0.0, 0.0], [-1e6, 0.0, 0.0]] {
+            assert!(!shows(eye), "{eye:?}");
+        }
+    }
 
     #[test]
     fn places_are_breadth_first_and_indices_those_of_the_scene() {

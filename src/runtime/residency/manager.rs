@@ -47,7 +47,8 @@ pub struct Step {
 pub struct Changes {
     /// Nodes that become resident.
     pub arrived: Vec<u32>,
-    /// Bytes that these hold for drawing, shared textures apart.
+    /// Bytes that are uploaded for these: what each holds for drawing, and shared textures that no
+    /// node drew before.
     pub arrived_bytes: u64,
     /// Nodes whose memory is to be freed.
     pub left: Vec<u32>,
@@ -388,23 +389,26 @@ impl Residency {
                 }
             });
         }
-        let mut bytes = 0;
+        let limit = self.upload_bytes.min(self.upload_limit);
         let mut taken = 0;
         for &node in &self.arrivals {
-            bytes += self.sizes.nodes[node as usize].held_bytes;
-            if taken > 0 && bytes > self.upload_bytes.min(self.upload_limit) && self.frame > 0 {
+            let size = &self.sizes.nodes[node as usize];
+            let new =
+                size.textures.iter().filter(|&&texture| !self.textures_drawn[texture as usize]);
+            let new_bytes = new.map(|&texture| self.sizes.textures[texture as usize].held_bytes);
+            let bytes = changes.arrived_bytes + size.held_bytes + new_bytes.sum::<u64>();
+            if taken > 0 && bytes > limit && self.frame > 0 {
                 break;
+            }
+            changes.arrived_bytes = bytes;
+            for &texture in &size.textures {
+                self.textures_drawn[texture as usize] = true;
             }
             taken += 1;
         }
         changes.arrived = self.arrivals.drain(..taken).collect();
         for &node in &changes.arrived {
             self.nodes[node as usize].state = NodeState::Resident;
-            let size = &self.sizes.nodes[node as usize];
-            changes.arrived_bytes += size.held_bytes;
-            for &texture in &size.textures {
-                self.textures_drawn[texture as usize] = true;
-            }
         }
         self.resident += taken;
         changes
