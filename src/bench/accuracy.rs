@@ -88,6 +88,8 @@ pub struct FrameSample<'a> {
     pub frame: u64,
     /// The camera.
     pub view: &'a View,
+    /// It belongs to the [loading phase](crate::engine::FrameReport::loading_phase).
+    pub loading_phase: bool,
     /// What was drawn.
     pub front: &'a [u32],
     /// What was drawn from the faces of cells.
@@ -107,6 +109,8 @@ pub struct FrameSample<'a> {
 pub struct WorstFrame {
     /// Its number in the path.
     pub frame: u64,
+    /// It belongs to the loading phase, after which there are not enough frames that are off.
+    pub loading_phase: bool,
     /// How far off it is.
     pub accuracy: Accuracy,
     /// What was drawn, as JPEG.

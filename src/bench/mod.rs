@@ -1,11 +1,12 @@
 //! Replays camera paths over a built scene and logs what a user would have felt.
 
 mod accuracy;
+mod broken_files;
 mod clock;
 mod compare;
 mod model_backend;
+mod model_files;
 mod model_load;
-mod model_occlusions;
 #[cfg(feature = "render")]
 mod node_cache;
 mod options;
@@ -21,15 +22,17 @@ mod summary;
 mod sweep;
 #[cfg(test)]
 mod tests;
+mod unseen_scene;
 #[cfg(feature = "render")]
 mod wall;
 mod write;
 
 pub use accuracy::{Accuracy, FrameInspector, FrameSample, ReferenceContext, WorstFrame};
+pub use broken_files::BrokenFiles;
 pub use clock::{CLOCK_FILE_VERSION, ClockConstants};
 pub use compare::{Comparison, Limit, Limits, Row, SummaryFile, Unit, compare};
 pub use model_backend::ModelBackend;
-pub use model_occlusions::ModelOcclusions;
+pub use model_files::ModelFiles;
 pub use options::{BenchOptions, Pace, PolicyChoice, Size};
 pub use record::FrameRecord;
 #[cfg(feature = "render")]
@@ -43,4 +46,4 @@ pub use sweep::Sweep;
 pub use wall::{Calibration, GpuBackend, Snapshots, calibrate, measure_start};
 #[cfg(feature = "render")]
 pub(crate) use write::write_beside;
-pub use write::{check_output, write_run};
+pub use write::{check_output, check_outside_scene, write_run};

@@ -1,4 +1,4 @@
-//! A backend in which nothing is read or drawn, so that runs are the same on every machine.
+//! A backend in which nothing is drawn, so that runs are the same on every machine.
 //!
 //! How long a frame takes is nobody's own equation. Other than in the engine's cost model, fragments
 //! are hidden by what is before them in the same tile of the image, small triangles waste the
@@ -8,9 +8,8 @@
 
 use std::sync::{Arc, Mutex};
 
-use super::ClockConstants;
 use super::model_load::TileLoad;
-use super::model_occlusions::ModelOcclusions;
+use super::{BrokenFiles, ClockConstants, ModelFiles};
 use crate::camera::View;
 use crate::engine::{Backend, Drawn, NodeOcclusion, lock};
 use crate::format::cells::Cells;
@@ -34,7 +33,9 @@ pub struct ModelBackend<'a> {
     credit: f64,
     load: TileLoad,
     cells: Option<Arc<Cells>>,
-    occlusions: Option<Arc<ModelOcclusions>>,
+    files: Option<Arc<ModelFiles>>,
+    with_occlusion: bool,
+    broken: BrokenFiles,
 }
 
 impl<'a> ModelBackend<'a> {
@@ -50,7 +51,9 @@ impl<'a> ModelBackend<'a> {
             credit: 0.0,
             load: TileLoad::default(),
             cells: None,
-            occlusions: None,
+            files: None,
+            with_occlusion: false,
+            broken: BrokenFiles::default(),
         }
     }
 
@@ -59,9 +62,33 @@ impl<'a> ModelBackend<'a> {
         Self { cells, ..self }
     }
 
-    /// Knows what nodes hide: that alone is read from files.
-    pub fn with_occlusions(self, occlusions: Arc<ModelOcclusions>) -> Self {
-        Self { occlusions: Some(occlusions), ..self }
+    /// Checks the files of the nodes that it loads, and reads what these hide, where that is wanted.
+    pub fn with_files(self, files: Arc<ModelFiles>, with_occlusion: bool) -> Self {
+        Self { files: Some(files), with_occlusion, ..self }
+    }
+
+    /// Begins with files that are known to be of no use.
+    pub fn with_broken(self, broken: BrokenFiles) -> Self {
+        Self { broken, ..self }
+    }
+
+    /// Files that could not be used.
+    pub fn broken(&self) -> &BrokenFiles {
+        &self.broken
+    }
+
+    /// All of the files of a node were read.
+    fn loaded(&mut self, node: u32, residency: &mut Residency) -> Result<()> {
+        let files = self.files.as_ref();
+        match files.map_or(Ok(None), |files| files.load(node, self.with_occlusion)) {
+            Ok(_) => residency.loaded(node),
+            Err(error @ Error::Input { .. }) => {
+                self.broken.add(&error);
+                residency.broken(node);
+            }
+            Err(error) => return Err(error),
+        }
+        Ok(())
     }
 
     /// What a frame takes by chance: a factor, and milliseconds.
@@ -85,7 +112,7 @@ impl Backend for ModelBackend<'_> {
             if !residency.chunk_read(root, step.bytes) {
                 return Err(Error::Internal(format!("root {root} is incomplete")));
             }
-            residency.loaded(root);
+            self.loaded(root, &mut residency)?;
         }
         Ok(())
     }
@@ -112,7 +139,8 @@ impl Backend for ModelBackend<'_> {
     }
 
     fn occlusion(&mut self, node: u32) -> Option<Arc<NodeOcclusion>> {
-        self.occlusions.as_ref()?.of(node)
+        let files = self.files.as_ref().filter(|_| self.with_occlusion)?;
+        files.load(node, true).ok().flatten()
     }
 
     fn end_frame(
@@ -132,7 +160,7 @@ impl Backend for ModelBackend<'_> {
             };
             self.credit -= step.bytes as f64;
             if residency.chunk_read(step.node, step.bytes) {
-                residency.loaded(step.node);
+                self.loaded(step.node, &mut residency)?;
             }
         }
         Ok(())

@@ -61,6 +61,8 @@ impl FrameRecord {
             "lacking",
             "evictions",
             "process_bytes",
+            "loading_phase",
+            "without_scene",
         ];
         let by_level = |what: &str| (0..levels).map(|l| format!("{what}_level_{l}")).collect();
         let by_level: [Vec<String>; 2] = [by_level("nodes"), by_level("triangles")];
@@ -111,6 +113,8 @@ impl FrameRecord {
             report.lacking.to_string(),
             report.evictions.to_string(),
             self.process_bytes.to_string(),
+            u8::from(report.loading_phase).to_string(),
+            u8::from(report.without_scene).to_string(),
         ];
         match &self.accuracy {
             Some(accuracy) => fields.extend(accuracy.fields()),

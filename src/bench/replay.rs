@@ -75,7 +75,7 @@ pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -
     let view =
         |index: usize| View::new(path.frames[index].pose, path.velocity(index), options.size.0);
     let interval_s = |index: usize| match options.pace {
-        Pace::Recorded => interval_s(path, index),
+        Pace::Recorded => path.interval_s(index),
         Pace::Unthrottled => 0.0,
     };
     for _ in 0..options.warm_up_frames {
@@ -106,6 +106,7 @@ pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -
                 let sample = FrameSample {
                     frame,
                     view: &view,
+                    loading_phase: record.report.loading_phase,
                     front,
                     far,
                     hidden,
@@ -125,12 +126,4 @@ pub fn run(replay: Replay<'_>, mut progress: impl FnMut(&FrameRecord) -> bool) -
     }
     let [peak_bytes, scene_bytes] = [engine.peak_bytes()?, engine.scene_bytes()?];
     Ok(Run { frames, start_bytes: engine.start_bytes(), peak_bytes, scene_bytes })
-}
-
-/// Seconds from a frame to the next, as recorded; the last lasts as long as the one before.
-fn interval_s(path: &CameraPath, index: usize) -> f64 {
-    let last = path.frames.len() - 1;
-    let from = index.min(last.saturating_sub(1));
-    let to = (from + 1).min(last);
-    path.frames[to].time_s - path.frames[from].time_s
 }

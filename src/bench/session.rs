@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use super::{
-    BenchOptions, ClockConstants, Context, FrameInspector, FrameRecord, ModelBackend,
-    ModelOcclusions, Replay, Run, run,
+    BenchOptions, BrokenFiles, ClockConstants, Context, FrameInspector, FrameRecord, ModelBackend,
+    ModelFiles, Replay, Run, Size, run, unseen_scene,
 };
 use crate::camera::CameraPath;
 use crate::engine::{CostModel, FarFieldMode, NodeOcclusion, Occluders, Policy};
@@ -44,7 +44,9 @@ pub struct Session {
     /// By how many triangles they may have, read where a policy first asks for them.
     occluders: Arc<Mutex<BTreeMap<u64, Arc<Occluders>>>>,
     /// For runs in which nothing is drawn.
-    occlusions: Arc<ModelOcclusions>,
+    model_files: Arc<ModelFiles>,
+    /// What a look at all files found, once a run began.
+    broken: Arc<OnceLock<BrokenFiles>>,
     cells: Option<Arc<Cells>>,
 }
 
@@ -53,9 +55,9 @@ impl Session {
     pub fn open(dir: &Path) -> Result<Self> {
         let scene = Arc::new(Scene::read(dir)?.breadth_first());
         let tree = SceneTree::new(&scene);
-        let occlusions = Arc::new(ModelOcclusions::new(NodeFiles::new(dir, Arc::clone(&scene))));
-        let (dir, occluders) = (dir.to_owned(), Arc::default());
-        Ok(Self { dir, scene, tree, occluders, occlusions, cells: None })
+        let model_files = Arc::new(ModelFiles::new(NodeFiles::new(dir, Arc::clone(&scene))));
+        let (dir, occluders, broken) = (dir.to_owned(), Arc::default(), Arc::default());
+        Ok(Self { dir, scene, tree, occluders, model_files, broken, cells: None })
     }
 
     /// Whether cells were made of it, or of an earlier build.
@@ -72,6 +74,9 @@ impl Session {
         };
         cells.check_scene(&self.scene, &self.dir)?;
         self.cells = Some(Arc::new(cells));
+        // These have files too.
+        self.model_files = Arc::new(ModelFiles::new(self.files()));
+        self.broken = Arc::default();
         Ok(())
     }
 
@@ -95,6 +100,31 @@ impl Session {
         &self.tree
     }
 
+    /// Refuses a path, read from `file`, no frame of which shows the scene in an image of a size.
+    pub fn check_path(&self, path: &CameraPath, file: &Path, size: Size) -> Result<()> {
+        if unseen_scene::is_ever_in_view(&self.tree, path, size.0) {
+            return Ok(());
+        }
+        let positions = self.positions(path, 0);
+        Err(Error::input(file, format!("no frame shows the scene: {positions}")))
+    }
+
+    /// Says where scene and camera are, if more than half of a run does not show the scene.
+    pub fn unseen_warning(&self, path: &CameraPath, run: &Run) -> Option<String> {
+        let is_unseen = |frame: &FrameRecord| frame.report.without_scene;
+        let unseen = run.frames.iter().filter(|frame| is_unseen(frame)).count();
+        let first = run.frames.iter().position(is_unseen)?;
+        (2 * unseen > run.frames.len()).then(|| {
+            let positions = self.positions(path, first);
+            format!("{unseen} of {} frames do not show the scene: {positions}", run.frames.len())
+        })
+    }
+
+    fn positions(&self, path: &CameraPath, index: usize) -> String {
+        let at = &path.frames[index];
+        unseen_scene::positions(self.tree.bounds(), at.frame, at.pose.position)
+    }
+
     /// The files of the scene, and of its cells where they were read.
     pub fn files(&self) -> NodeFiles {
         let files = NodeFiles::new(&self.dir, Arc::clone(&self.scene));
@@ -102,6 +132,16 @@ impl Session {
             Some(cells) => files.with_faces(cells),
             None => files,
         }
+    }
+
+    /// Files that are missing, of another size or without their header; all are looked at once.
+    fn broken(&self) -> BrokenFiles {
+        let look = || {
+            let mut broken = BrokenFiles::default();
+            self.files().unusable().iter().for_each(|error| broken.add(error));
+            broken
+        };
+        self.broken.get_or_init(look).clone()
     }
 
     /// The hierarchy with the costs of a machine.
@@ -236,10 +276,11 @@ impl Session {
         let cells = self.cells_for(&options)?;
         let mut policy = options.policy.make()?;
         let tree = self.tree_for(&constants);
-        let context = Context { constants, ..self.context(options.clone(), path, &*policy) };
+        let mut context = Context { constants, ..self.context(options.clone(), path, &*policy) };
         let occluders = self.occluders(&options, &*policy)?;
         let mut backend = ModelBackend::new(&tree, constants, options.seed)
-            .with_occlusions(Arc::clone(&self.occlusions))
+            .with_files(Arc::clone(&self.model_files), options.cull_hidden)
+            .with_broken(self.broken())
             .with_cells(cells.clone());
         let residency = self.residency(&options, &*policy, cells.as_deref())?;
         let replay = Replay {
@@ -257,7 +298,9 @@ impl Session {
             },
             options,
         };
-        Ok((run(replay, progress)?, context))
+        let run = run(replay, progress)?;
+        context.broken = backend.broken().messages().to_vec();
+        Ok((run, context))
     }
 
     /// Replays a path on a graphics adapter, by the clock on the wall. Where `constants` are
@@ -312,7 +355,8 @@ impl Session {
             renderer,
             Arc::clone(&residency),
             snapshots,
-        );
+        )
+        .with_broken(self.broken());
         let replay = Replay {
             tree: &tree,
             path,
@@ -329,7 +373,7 @@ impl Session {
             options,
         };
         let run = run(replay, progress)?;
-        context.broken = backend.broken().to_vec();
+        context.broken = backend.broken().messages().to_vec();
         Ok((run, context))
     }
 

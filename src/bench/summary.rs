@@ -9,7 +9,7 @@ use super::{Accuracy, BenchOptions, FrameRecord, ReferenceContext, Run};
 use crate::picture_error::psnr;
 
 /// The version of the format of `summary.json`, raised where a key changes its meaning.
-pub const SUMMARY_VERSION: u32 = 1;
+pub const SUMMARY_VERSION: u32 = 2;
 
 /// Above the target by more than this part counts as late.
 const LATE: f64 = 0.1;
@@ -47,14 +47,19 @@ pub struct Context {
 }
 
 /// The summary of a run, as `summary.json` holds it.
+///
+/// Means, deviations, percentiles and shares are over the frames that show the scene; image error
+/// is over those of them after the loading phase. Sums and maxima of bytes are over all frames.
 pub fn summary(run: &Run, context: &Context) -> Value {
     let frames = &run.frames;
     let target = context.options.target_ms;
-    let of = |field: fn(&FrameRecord) -> f64| frames.iter().map(field).collect::<Vec<f64>>();
+    let shown: Vec<&FrameRecord> =
+        frames.iter().filter(|frame| !frame.report.without_scene).collect();
+    let (loading, warm): (Vec<&FrameRecord>, Vec<&FrameRecord>) =
+        shown.iter().partition(|frame| frame.report.loading_phase);
+    let of =
+        |field: fn(&FrameRecord) -> f64| shown.iter().map(|at| field(at)).collect::<Vec<f64>>();
     let times = of(|frame| frame.report.frame_ms);
-    let share = |holds: &dyn Fn(&f64) -> bool| {
-        mean(times.iter().map(|time| f64::from(u8::from(holds(time)))))
-    };
     let over: Vec<f64> =
         times.iter().filter(|&&time| time > target).map(|time| time - target).collect();
     let toggles = |frames: &[FrameRecord]| {
@@ -70,10 +75,11 @@ pub fn summary(run: &Run, context: &Context) -> Value {
     let bytes = |of: fn(&FrameRecord) -> u64| frames.iter().map(of).sum::<u64>();
     let levels = |level: usize| {
         json!({
-            "nodes": mean(frames.iter().map(|frame| f64::from(frame.report.nodes_by_level[level]))),
-            "triangles": mean(frames.iter().map(|frame| frame.report.triangles_by_level[level] as f64)),
+            "nodes": mean(shown.iter().map(|frame| f64::from(frame.report.nodes_by_level[level]))),
+            "triangles": mean(shown.iter().map(|frame| frame.report.triangles_by_level[level] as f64)),
         })
     };
+    let reference = context.reference.as_ref();
     json!({
         "format_version": SUMMARY_VERSION,
         "version": env!("CARGO_PKG_VERSION"),
@@ -86,6 +92,11 @@ pub fn summary(run: &Run, context: &Context) -> Value {
         "adapter": context.adapter,
         "broken_files": context.broken,
         "frames": frames.len(),
+        "frames_without_scene": frames.len() - shown.len(),
+        // Until the first frame that needs nothing which is not in memory, two seconds at most.
+        "loading_phase": phase(&loading, target),
+        // After it.
+        "warm": phase(&warm, target),
         "frame_ms": {
             "mean": mean(times.iter().copied()),
             "sd": deviation(&times),
@@ -94,18 +105,18 @@ pub fn summary(run: &Run, context: &Context) -> Value {
             "p99": percentile(&times, 99.0),
             "max": percentile(&times, 100.0),
         },
-        "over_target_share": share(&|&time| time > target),
-        "late_share": share(&|&time| time > target * (1.0 + LATE)),
+        "over_target_share": share_above(&times, target),
+        "late_share": share_above(&times, target * (1.0 + LATE)),
         "over_target_ms": { "mean": mean(over.iter().copied()), "max": percentile(&over, 100.0) },
         "utilisation": mean(of(|frame| frame.report.actual_ms)) / target,
-        "estimate_error_percent": error(frames, |frame| frame.report.estimated_ms),
+        "estimate_error_percent": error(&shown, |frame| frame.report.estimated_ms),
         "without_feedback": {
             "estimate_error_percent":
-                error(frames, |frame| frame.report.estimated_without_feedback_ms),
+                error(&shown, |frame| frame.report.estimated_without_feedback_ms),
         },
         // Of whole frames, uploads included, by the engine's cost model.
         "modelled_error_percent": error_of(
-            frames,
+            &shown,
             |frame| frame.report.frame_ms,
             |frame| frame.report.modelled_ms,
         ),
@@ -136,7 +147,7 @@ pub fn summary(run: &Run, context: &Context) -> Value {
             // Frames in which a node was not in memory that would have been drawn.
             "lacking_percent": mean(of(|frame| f64::from(u8::from(frame.report.lacking > 0)))) * 100.0,
         },
-        "accuracy": context.reference.as_ref().map(|reference| accuracy(frames, reference)),
+        "accuracy": reference.map(|reference| accuracy(frames, reference)),
         "select_ms": {
             "mean": mean(of(|frame| frame.report.select_ms)),
             "max": percentile(&of(|frame| frame.report.select_ms), 100.0),
@@ -160,18 +171,50 @@ pub fn summary(run: &Run, context: &Context) -> Value {
     })
 }
 
-/// How far the frames that were looked at are from the leaves.
+/// Times of some of the frames that show the scene; `null` in place of figures of none.
+fn phase(frames: &[&FrameRecord], target_ms: f64) -> Value {
+    let times: Vec<f64> = frames.iter().map(|frame| frame.report.frame_ms).collect();
+    let figure = |value: f64| (!times.is_empty()).then_some(value);
+    let uploads = frames.iter().map(|frame| frame.report.upload_ms);
+    json!({
+        "frames": times.len(),
+        "frame_ms": {
+            "mean": figure(mean(times.iter().copied())),
+            "p50": figure(percentile(&times, 50.0)),
+            "p95": figure(percentile(&times, 95.0)),
+            "max": figure(percentile(&times, 100.0)),
+        },
+        "upload_ms_mean": figure(mean(uploads)),
+        "over_target_share": figure(share_above(&times, target_ms)),
+        "late_share": figure(share_above(&times, target_ms * (1.0 + LATE))),
+    })
+}
+
+/// The share of values above a limit; 0 of none.
+fn share_above(values: &[f64], limit: f64) -> f64 {
+    mean(values.iter().map(|&value| f64::from(u8::from(value > limit))))
+}
+
+/// How far frames are from the leaves: those that were looked at, show the scene and come after
+/// the loading phase. FLIP of the loading phase stands apart.
 fn accuracy(frames: &[FrameRecord], reference: &ReferenceContext) -> Value {
     // Frames that were looked at for what changed in them are no fair part of all.
     let every = usize::try_from(reference.every).unwrap_or(usize::MAX).max(1);
-    let looked: Vec<&Accuracy> =
-        frames.iter().step_by(every).filter_map(|f| f.accuracy.as_ref()).collect();
+    let phase = |loading: bool| -> Vec<&Accuracy> {
+        let fits = |frame: &&FrameRecord| {
+            frame.report.loading_phase == loading && !frame.report.without_scene
+        };
+        frames.iter().step_by(every).filter(fits).filter_map(|at| at.accuracy.as_ref()).collect()
+    };
+    let (looked, loading) = (phase(false), phase(true));
     let of = |field: fn(&Accuracy) -> f64| looked.iter().map(|&a| field(a)).collect::<Vec<f64>>();
+    // Nothing that was not looked at is without error.
+    let figure = |values: &[f64], value: f64| (!values.is_empty()).then_some(value);
     let spread = |values: Vec<f64>| {
         json!({
-            "mean": mean(values.iter().copied()),
-            "p95": percentile(&values, 95.0),
-            "max": percentile(&values, 100.0),
+            "mean": figure(&values, mean(values.iter().copied())),
+            "p95": figure(&values, percentile(&values, 95.0)),
+            "max": figure(&values, percentile(&values, 100.0)),
         })
     };
     let surface: u64 = looked.iter().map(|a| a.reference_pixels).sum();
@@ -193,16 +236,25 @@ fn accuracy(frames: &[FrameRecord], reference: &ReferenceContext) -> Value {
     json!({
         "every": reference.every,
         "adapter": reference.adapter,
-        "frames": looked.len(),
+        "frames": looked.len() + loading.len(),
+        // Figures are over these, but for those of the loading phase and pops.
+        "warm_frames": looked.len(),
+        "loading_phase": {
+            "frames": loading.len(),
+            "flip_mean": spread(loading.iter().map(|a| a.flip_mean).collect()),
+        },
         "flip_mean": spread(of(|a| a.flip_mean)),
         "flip_p95": spread(of(|a| a.flip_p95)),
         // Of all pixels together; null where no pixel differs.
         "psnr_db": {
-            "all": psnr(mean(squared.iter().copied())),
-            "min": psnr(percentile(&squared, 100.0)),
+            "all": figure(&squared, psnr(mean(squared.iter().copied()))),
+            "min": figure(&squared, psnr(percentile(&squared, 100.0))),
         },
-        "ssim": { "mean": mean(similar.iter().copied()), "min": percentile(&similar, 0.0) },
-        "reference_triangles_mean": mean(of(|a| a.reference_triangles as f64)),
+        "ssim": {
+            "mean": figure(&similar, mean(similar.iter().copied())),
+            "min": figure(&similar, percentile(&similar, 0.0)),
+        },
+        "reference_triangles_mean": figure(&squared, mean(of(|a| a.reference_triangles as f64))),
         "reference_pixels": surface,
         "gap_pixels": pixels(|a| a.gap_pixels),
         "inner_gap_pixels": pixels(|a| a.inner_gap_pixels),
@@ -221,12 +273,12 @@ pub(super) fn error_percent(actual_ms: f64, estimated_ms: f64) -> Option<f64> {
     (estimated_ms > 0.0).then(|| (actual_ms / estimated_ms - 1.0) * 100.0)
 }
 
-fn error(frames: &[FrameRecord], estimate: fn(&FrameRecord) -> f64) -> Value {
+fn error(frames: &[&FrameRecord], estimate: fn(&FrameRecord) -> f64) -> Value {
     error_of(frames, |frame| frame.report.actual_ms, estimate)
 }
 
 fn error_of(
-    frames: &[FrameRecord],
+    frames: &[&FrameRecord],
     actual: fn(&FrameRecord) -> f64,
     estimate: fn(&FrameRecord) -> f64,
 ) -> Value {
@@ -268,7 +320,12 @@ pub fn summary_text(summary: &Value) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(out, "{name:<12}{text}");
     };
-    line("frames", format!("{}, {} clock", number("/frames"), text(summary, "/clock")));
+    let without_scene = match number("/frames_without_scene") {
+        frames if frames > 0.0 => format!("; {frames} do not show the scene: in no mean below"),
+        _ => String::new(),
+    };
+    let clock = text(summary, "/clock");
+    line("frames", format!("{}, {clock} clock{without_scene}", number("/frames")));
     line(
         "frame time",
         format!(
@@ -288,6 +345,21 @@ pub fn summary_text(summary: &Value) -> String {
             number("/utilisation") * 100.0
         ),
     );
+    let phase = |key: &str| {
+        format!(
+            "{:.1} ms mean, {:.1} % over the target by more than a tenth",
+            number(&format!("/{key}/frame_ms/mean")),
+            number(&format!("/{key}/late_share")) * 100.0,
+        )
+    };
+    if number("/loading_phase/frames") > 0.0 {
+        let after = match number("/warm/frames") {
+            frames if frames > 0.0 => format!("; after it {}", phase("warm")),
+            _ => "; the path ends within it".into(),
+        };
+        let frames = number("/loading_phase/frames");
+        line("start", format!("{frames} frames of loading, {}{after}", phase("loading_phase")));
+    }
     line(
         "estimate",
         format!(
@@ -365,10 +437,17 @@ pub fn summary_text(summary: &Value) -> String {
         ),
     );
     if summary.pointer("/accuracy").is_some_and(Value::is_object) {
-        line(
-            "accuracy",
-            format!(
-                "FLIP {:.4} mean, {:.4} at worst; SSIM {:.4}; PSNR {}; {} frames looked at",
+        let frames = number("/accuracy/warm_frames");
+        let loading = match number("/accuracy/loading_phase/frames") {
+            frames if frames > 0.0 => format!(
+                "; {frames} more of the loading phase, FLIP {:.4} mean",
+                number("/accuracy/loading_phase/flip_mean/mean")
+            ),
+            _ => String::new(),
+        };
+        let warm = match frames > 0.0 {
+            true => format!(
+                "FLIP {:.4} mean, {:.4} at worst; SSIM {:.4}; PSNR {}; {frames} frames looked at",
                 number("/accuracy/flip_mean/mean"),
                 number("/accuracy/flip_mean/max"),
                 number("/accuracy/ssim/mean"),
@@ -376,9 +455,10 @@ pub fn summary_text(summary: &Value) -> String {
                     decibels if decibels.is_nan() => "infinite".into(),
                     decibels => format!("{decibels:.1} dB"),
                 },
-                number("/accuracy/frames"),
             ),
-        );
+            false => "no frame was looked at after the loading phase; see --warm-up-frames".into(),
+        };
+        line("accuracy", format!("{warm}{loading}"));
         line(
             "gaps",
             format!(

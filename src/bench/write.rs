@@ -7,6 +7,7 @@ use serde_json::Value;
 use tempfile::NamedTempFile;
 
 use super::{Context, FrameRecord, Run, report_html};
+use crate::format::resolve;
 use crate::{Error, Result};
 
 /// Whether results can be written into a folder, before a run that would be in vain. Leaves
@@ -27,6 +28,22 @@ pub fn check_output(dir: &Path) -> Result<()> {
     match NamedTempFile::new_in(existing) {
         Ok(_) => Ok(()),
         Err(error) => fails(format!("cannot write into {}: {error}", existing.display())),
+    }
+}
+
+/// Refuses results inside of the folder that `hlod-build` wrote: the next build replaces that
+/// folder as a whole, and refuses to where it holds anything else.
+pub fn check_outside_scene(out: &Path, scene: &Path) -> Result<()> {
+    let (Ok(target), Ok(scene)) = (resolve(out), std::fs::canonicalize(scene)) else {
+        return Ok(()); // whoever reads the one or writes the other says why
+    };
+    match target.starts_with(&scene) {
+        true => Err(Error::output(
+            out,
+            "lies within the folder of the built scene, which could not be built again then; \
+             choose another place",
+        )),
+        false => Ok(()),
     }
 }
 

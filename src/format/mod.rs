@@ -30,6 +30,7 @@ mod output_dir;
 #[cfg(test)]
 mod output_dir_tests;
 mod quantized;
+mod regular_file;
 pub mod rims;
 mod scene;
 mod scene_check;
@@ -49,8 +50,10 @@ pub use file_name::is_plain_file_name;
 pub use glb_read::read_glb;
 pub use glb_write::{NodeLabel, write_glb, write_glb_encoded};
 pub use node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
+pub(crate) use output_dir::resolve;
 pub use output_dir::{OutputDir, Unfinished, check_apart};
 pub use quantized::fits_in_steps;
+pub(crate) use regular_file::{open_regular, read_regular};
 pub use scene::{BlockInfo, Children, Node, Scene, SharedTexture};
 pub use scene_check::{Element, SceneDefect};
 

@@ -254,7 +254,7 @@ pub fn check_apart<P: AsRef<Path>>(
 }
 
 /// `path`, absolute and with links resolved as far as it exists.
-fn resolve(path: &Path) -> io::Result<PathBuf> {
+pub(crate) fn resolve(path: &Path) -> io::Result<PathBuf> {
     let path = std::path::absolute(path)?;
     match fs::canonicalize(&path) {
         Ok(real) => Ok(real),

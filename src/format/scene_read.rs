@@ -48,7 +48,7 @@ impl Scene {
     /// Reads the scene of an output folder.
     pub fn read(dir: &Path) -> Result<Self> {
         let path = dir.join(SCENE_FILE);
-        match std::fs::read(&path) {
+        match crate::format::read_regular(&path) {
             Ok(bytes) => Self::from_bytes(&bytes, &path),
             Err(error) => Err(Error::input(path, format!("cannot read the scene: {error}"))),
         }

@@ -45,6 +45,10 @@ pub fn find_inputs(arguments: &[PathBuf]) -> Result<Vec<PathBuf>> {
                 let what = format!("no model in this folder or below it; {EXPECTED}");
                 return Err(Error::input(argument, what));
             }
+        } else if !metadata.is_file() {
+            // It is read several times, and a pipe can be read once.
+            let what = "expected a regular file or a folder, found a pipe, socket or device";
+            return Err(Error::input(argument, what));
         } else if kind(argument).is_some() {
             found.add(argument.clone());
         } else {
@@ -137,6 +141,20 @@ mod tests {
         assert!(refusal(&root.join("absent.obj")).to_string().contains("no such file"));
         fs::write(root.join("city.fbx"), "").unwrap();
         assert!(refusal(&root.join("city.fbx")).to_string().contains("expected .obj"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_named_pipe_is_refused_and_not_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("city.obj");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        if !made.is_ok_and(|status| status.success()) {
+            println!("skipped: no mkfifo");
+            return;
+        }
+        let refusal = find_inputs(&[pipe]).unwrap_err();
+        assert!(refusal.exit_code() == 3 && refusal.to_string().contains("regular file"));
     }
 
     #[cfg(unix)]

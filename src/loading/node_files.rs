@@ -6,11 +6,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use crate::engine::NodeOcclusion;
 use crate::format::cells::{CELLS_DIR, Cells, Face};
-use crate::format::{NODES_DIR, NodeMesh, Scene, TEXTURES_DIR, file_crc, read_glb};
+use crate::format::{
+    NODES_DIR, NodeMesh, Scene, SharedTexture, TEXTURES_DIR, file_crc, open_regular, read_glb,
+};
 use crate::render::content::{Content, DrawPicture, Picture, TextureFormat};
 use crate::{Error, Result};
 
@@ -138,28 +141,88 @@ impl NodeFiles {
         if let Some(face) = self.face(node) {
             return self.decode_face(node, face, path, &bytes);
         }
-        let (glb, mut rest) = self.checked(node, path, &bytes)?;
+        let (glb, rest) = self.checked(node, path, &bytes)?;
         let content = Content::decode(path, glb, |name| self.textures.get(name).copied())?
             .stored_as(self.format);
         let mut pictures = Vec::with_capacity(textures.len());
-        for (&texture, (path, size)) in textures.iter().zip(&files[1..]) {
-            let (bytes, after) = rest.split_at_checked(*size as usize).ok_or_else(|| {
-                Error::input(path, format!("expected {size} bytes, found {}", rest.len()))
-            })?;
-            let entry = &self.scene.shared_textures[texture as usize];
-            let picture = Picture::decode(path, bytes, [entry.width, entry.height])?;
+        self.decode_shared(&textures, &files[1..], rest, |texture, picture| {
             pictures.push((texture, picture.stored_as(self.format)));
-            rest = after;
-        }
+        })?;
         let occlusion =
             || -> Result<_> { Ok(NodeOcclusion::new(&read_glb(glb, path)?, self.scene.up)) };
         let occlusion = self.with_occlusion.then(occlusion).transpose()?;
         Ok(Arrival { node, content, pictures, occlusion })
     }
 
+    /// Decodes shared pictures, whose files follow each other in `bytes`.
+    fn decode_shared(
+        &self,
+        textures: &[u32],
+        files: &[(PathBuf, u64)],
+        mut bytes: &[u8],
+        mut take: impl FnMut(u32, Picture),
+    ) -> Result<()> {
+        for (&texture, (path, size)) in textures.iter().zip(files) {
+            let (file, after) = bytes.split_at_checked(*size as usize).ok_or_else(|| {
+                Error::input(path, format!("expected {size} bytes, found {}", bytes.len()))
+            })?;
+            let entry = &self.scene.shared_textures[texture as usize];
+            take(texture, Picture::decode(path, file, [entry.width, entry.height])?);
+            bytes = after;
+        }
+        Ok(())
+    }
+
+    /// Checks the files of a node or a face as far as [`read`](Self::read) does, and decodes none
+    /// of its geometry and own pictures, which the checksum covers. What it hides, where that is
+    /// asked for.
+    pub fn check(
+        &self,
+        number: u32,
+        held: impl Fn(u32) -> bool,
+        with_occlusion: bool,
+    ) -> Result<Option<NodeOcclusion>> {
+        let mut reading = self.begin(number, held);
+        reading.read(reading.left())?;
+        let Reading { files, textures, bytes, .. } = reading;
+        let (path, _) = &files[0];
+        guarded(path.clone(), || {
+            let (glb, rest) = self.checked(number, path, &bytes)?;
+            self.decode_shared(&textures, &files[1..], rest, |_, _| {})?;
+            match with_occlusion && self.face(number).is_none() {
+                true => Ok(Some(NodeOcclusion::new(&read_glb(glb, path)?, self.scene.up))),
+                false => Ok(None),
+            }
+        })
+    }
+
+    /// The shared textures of a node; none of a face.
+    pub fn textures_of(&self, number: u32) -> &[u32] {
+        self.scene.nodes.get(number as usize).map_or(&[], |node| &node.shared_textures)
+    }
+
+    /// Errors of files that are missing or not of their size, or that do not begin with the header
+    /// of a GLB file of that size: those of nodes, shared textures and faces, in this order. Reads
+    /// no more than the headers.
+    pub fn unusable(&self) -> Vec<Error> {
+        let glb = |dir: &str, name: &str, size| (self.dir.join(dir).join(name), size, true);
+        let texture =
+            |at: &SharedTexture| (self.dir.join(TEXTURES_DIR).join(&at.file_name), at.bytes, false);
+        let check = |(path, size, is_glb): (PathBuf, u64, bool)| {
+            open(&path, size)
+                .and_then(|file| if is_glb { check_header(file, &path, size) } else { Ok(()) })
+                .err()
+        };
+        let scene = &self.scene;
+        let nodes = scene.nodes.par_iter().map(|at| glb(NODES_DIR, &at.file, at.file_bytes));
+        let textures = scene.shared_textures.par_iter().map(texture);
+        let faces = self.faces.par_iter().map(|at| glb(CELLS_DIR, &at.file, at.file_bytes));
+        nodes.chain(textures).chain(faces).filter_map(check).collect()
+    }
+
     /// Pictures of a face are projected from where they were taken.
     fn decode_face(&self, number: u32, face: &Face, path: &Path, bytes: &[u8]) -> Result<Arrival> {
-        let (glb, _) = checked(face.file_bytes, face.file_crc, path, bytes)?;
+        let (glb, _) = self.checked(number, path, bytes)?;
         let mut content = Content::decode(path, glb, |_| None)?.stored_as(self.format);
         let sizes = face.views.iter().map(|view| view.size);
         let found = content.pictures.iter().map(|picture| [picture.width(), picture.height()]);
@@ -174,10 +237,16 @@ impl NodeFiles {
         Ok(Arrival { node: number, content, pictures: Vec::new(), occlusion: None })
     }
 
-    /// The bytes of a node's file, checked, and those after it.
+    /// The bytes of the file of a node or a face, checked, and those after it.
     fn checked<'a>(&self, node: u32, path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], &'a [u8])> {
-        let entry = &self.scene.nodes[node as usize];
-        checked(entry.file_bytes, entry.file_crc, path, bytes)
+        let (size, crc) = match self.face(node) {
+            Some(face) => (face.file_bytes, face.file_crc),
+            None => {
+                let entry = &self.scene.nodes[node as usize];
+                (entry.file_bytes, entry.file_crc)
+            }
+        };
+        checked(size, crc, path, bytes)
     }
 
     /// Reads the geometry of a node alone: its pictures stay encoded.
@@ -206,6 +275,35 @@ impl NodeFiles {
         let bytes = reading.left();
         reading.read(bytes)?;
         self.finish(reading)
+    }
+}
+
+/// Opens a file that has a size.
+fn open(path: &Path, size: u64) -> Result<File> {
+    let failed = |error: std::io::Error| Error::input(path, format!("cannot read: {error}"));
+    let file = open_regular(path).map_err(failed)?;
+    let found = file.metadata().map_err(failed)?.len();
+    match found == size {
+        true => Ok(file),
+        false => Err(Error::input(
+            path,
+            format!("expected {size} bytes, found {found}: not the file of this build"),
+        )),
+    }
+}
+
+/// Refuses what does not begin as a GLB file of a size does.
+fn check_header(mut file: File, path: &Path, size: u64) -> Result<()> {
+    let mut found = [0; 12];
+    let read = file.read_exact(&mut found);
+    read.map_err(|error| Error::input(path, format!("cannot read: {error}")))?;
+    let words = [u32::from_le_bytes(*b"glTF"), 2, size as u32];
+    match found.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).eq(words) {
+        true => Ok(()),
+        false => Err(Error::input(
+            path,
+            format!("damaged: expected the header of a GLB file of {size} bytes"),
+        )),
     }
 }
 
@@ -289,17 +387,7 @@ impl Reading {
         let failed = |error: std::io::Error| Error::input(path, format!("cannot read: {error}"));
         let mut file = match self.open.take() {
             Some((open, file)) if open == which => file,
-            _ => {
-                let file = File::open(path).map_err(failed)?;
-                let found = file.metadata().map_err(failed)?.len();
-                if found != *size {
-                    return Err(Error::input(
-                        path,
-                        format!("expected {size} bytes, found {found}: not the file of this build"),
-                    ));
-                }
-                file
-            }
+            _ => open(path, *size)?,
         };
         let from = self.bytes.len();
         let read = Read::by_ref(&mut file).take(bytes).read_to_end(&mut self.bytes);

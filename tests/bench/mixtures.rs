@@ -143,6 +143,7 @@ fn inspect(reference: &mut Reference, pose: &Pose, front: &[u32]) -> Accuracy {
     let sample = FrameSample {
         frame: 0,
         view: &view,
+        loading_phase: false,
         front,
         far: &FarShown::default(),
         hidden: &[],

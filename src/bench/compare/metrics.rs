@@ -15,10 +15,12 @@ pub(super) struct Metric {
     pub optional: bool,
     /// Only how large it is matters, not in which direction.
     pub magnitude: bool,
+    /// Unless a limit is given, neither run may have any.
+    pub none_allowed: bool,
 }
 
 const fn metric(name: &'static str, unit: Unit, keys: &'static [&'static str]) -> Metric {
-    Metric { name, unit, keys, scale: 1.0, optional: false, magnitude: false }
+    Metric { name, unit, keys, scale: 1.0, optional: false, magnitude: false, none_allowed: false }
 }
 
 /// A share, 0 to 1 in the summary.
@@ -55,6 +57,11 @@ pub(super) const METRICS: &[Metric] = &[
     metric("nodes-visited", Unit::Count, &["/visited_mean"]),
     metric("nodes", Unit::Count, &["/nodes_mean"]),
     metric("triangles", Unit::Count, &["/triangles_mean"]),
+    Metric {
+        optional: true,
+        none_allowed: true,
+        ..metric("broken-files", Unit::Count, &["/broken_files"])
+    },
     of_images("flip", Unit::Flip, &["/accuracy/flip_mean/mean"]),
     of_images("flip-p95", Unit::Flip, &["/accuracy/flip_p95/mean"]),
     of_images("flip-of-toggles", Unit::Flip, &["/accuracy/pop_flip/mean"]),
@@ -71,7 +78,8 @@ pub(super) fn help() -> String {
          what has no limit is shown and not judged. Several may be given.\n\n\
          METRIC is one of {}. `late` is the share of frames over the target by more than a tenth, \
          in percentage points (`late=+2pp`), as are other shares; those of FLIP and of gaps need \
-         --reference-every",
+         --reference-every. `broken-files` exceeds its limit where either run has any, unless a limit \
+         is given for it",
         names.join(", ")
     )
 }

@@ -76,19 +76,25 @@ pub fn compare(
         let (base, new) = (figure(base)?, figure(new)?);
         let mut limits: Vec<&Limit> = limits.of(metric.name).collect();
         limits.sort_by_key(|limit| !limit.is_exceeded(base, new));
-        let texts: Vec<String> = limits.iter().map(|limit| limit.to_string()).collect();
+        let mut texts: Vec<String> = limits.iter().map(|limit| limit.to_string()).collect();
+        let mut exceeded = limits.first().is_some_and(|limit| limit.is_exceeded(base, new));
+        if metric.none_allowed && limits.is_empty() {
+            texts.push("0".into());
+            // A run that went on without some files says nothing about the others.
+            exceeded = base > 0.0 || new > 0.0;
+        }
         Ok(Row {
             metric: metric.name,
             unit: metric.unit,
             base,
             new,
-            exceeded: limits.first().is_some_and(|limit| limit.is_exceeded(base, new)),
+            exceeded,
             limit: (!texts.is_empty()).then(|| texts.join(", ")),
         })
     });
     let rows: Vec<Row> = rows.collect::<Result<_>>()?;
     // What neither run need have is of interest only where it was to be judged.
-    let missing = |row: &Row| row.limit.is_none() && row.base.is_nan() && row.new.is_nan();
+    let missing = |row: &Row| !row.exceeded && row.base.is_nan() && row.new.is_nan();
     let rows = METRICS.iter().zip(rows).filter(|(metric, row)| !(metric.optional && missing(row)));
     Ok(Comparison { differences, rows: rows.map(|(_, row)| row).collect() })
 }

@@ -40,11 +40,12 @@ impl SummaryFile {
         self.value.pointer(key).ok_or_else(|| self.wrong(key, "found nothing there"))
     }
 
-    /// The number at a JSON pointer; NaN for `null`, which is what a number that is none becomes
+    /// The number at a JSON pointer; that of the elements of a list; NaN for `null`, which is what a number that is none becomes
     /// in JSON.
     pub(super) fn number(&self, key: &str) -> Result<f64> {
         match self.get(key)? {
             Value::Null => Ok(f64::NAN),
+            Value::Array(values) => Ok(values.len() as f64),
             value => value.as_f64().ok_or_else(|| {
                 self.wrong(key, &format!("expected a number, found {}", short(value)))
             }),

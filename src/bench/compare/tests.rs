@@ -108,6 +108,25 @@ fn each_limit_judges_its_own_figure_and_holds_up_to_itself() {
 }
 
 #[test]
+fn files_that_either_run_could_not_use_exceed_a_limit_of_their_own() {
+    let with_broken = |names: &[&str]| {
+        let mut summary = summary();
+        summary["broken_files"] = json!(names);
+        file("some.json", summary)
+    };
+    let compared = |base: &[&str], new: &[&str], arguments: &[&str]| {
+        compare(&with_broken(base), &with_broken(new), &limits(arguments), false).unwrap()
+    };
+    let none = compared(&[], &[], &[]);
+    assert!(!none.exceeded() && none.text().contains("broken-files"), "{}", none.text());
+    for (base, new) in [(&[][..], &["a"][..]), (&["a"], &[]), (&["a"], &["a"])] {
+        assert!(compared(base, new, &[]).exceeded(), "{base:?} {new:?}");
+    }
+    let allowed = compared(&["a"], &["a", "b"], &["--max", "broken-files=+1"]);
+    assert!(!allowed.exceeded());
+}
+
+#[test]
 fn runs_of_different_things_are_refused_and_named_unless_forced() {
     let cases = [
         ("/scene_fingerprint", json!("ffff"), r#"scene_fingerprint: "5ce9e" against "ffff""#),

@@ -75,8 +75,11 @@ impl PolicyRun {
         let of = |field: fn(&FrameRecord) -> f64| frames.iter().map(field).collect::<Vec<f64>>();
         let times = of(|frame| frame.report.frame_ms);
         let late = |ms: f64| ms > key.target_ms * (1.0 + LATE);
-        let looked =
-            frames.iter().step_by(inspected.every.max(1)).filter_map(|at| at.accuracy.as_ref());
+        let looked = frames
+            .iter()
+            .step_by(inspected.every.max(1))
+            .filter(|at| !(at.report.loading_phase || at.report.without_scene))
+            .filter_map(|at| at.accuracy.as_ref());
         let flips: Vec<f64> = looked.map(|accuracy| accuracy.flip_mean).collect();
         let known = |values: &[f64], value: f64| if values.is_empty() { f64::NAN } else { value };
         let finer = frames.iter().filter(|frame| frame.report.finer_resident);

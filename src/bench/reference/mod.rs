@@ -104,22 +104,27 @@ impl Reference {
         Ok(ReferenceContext { every: self.every, adapter, broken, worst: self.worst })
     }
 
-    /// Keeps a frame as pictures where it is one of the worst.
+    /// Keeps a frame as pictures where it is one of the worst. Frames of the loading phase, which
+    /// would always be, come after all others.
     fn keep(
         &mut self,
         frame: u64,
+        loading_phase: bool,
         accuracy: &Accuracy,
         [drawn, reference]: [&RgbImage; 2],
         difference: &FlipMap,
     ) -> Result<()> {
         let flip = accuracy.flip_mean;
-        let place = self.worst.partition_point(|worst| worst.accuracy.flip_mean >= flip);
+        let place = self.worst.partition_point(|worst| {
+            (!worst.loading_phase, worst.accuracy.flip_mean) >= (!loading_phase, flip)
+        });
         if place >= WORST || flip == 0.0 {
             return Ok(());
         }
         self.worst.truncate(WORST - 1);
         let worst = WorstFrame {
             frame,
+            loading_phase,
             accuracy: accuracy.clone(),
             drawn: jpeg(drawn)?,
             reference: jpeg(reference)?,
@@ -185,7 +190,7 @@ impl FrameInspector for Reference {
             let pop = flip(&before, picture, PIXELS_PER_DEGREE).ok_or_else(other_size)?;
             accuracy.pop_flip = Some(pop.mean());
         }
-        self.keep(frame, &accuracy, [picture, expected], &map)?;
+        self.keep(frame, sample.loading_phase, &accuracy, [picture, expected], &map)?;
         Ok(accuracy)
     }
 }

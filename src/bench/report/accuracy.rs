@@ -76,6 +76,7 @@ pub(super) fn worst(reference: &ReferenceContext) -> Markup {
                 section .worst {
                     h3 {
                         "Frame " (worst.frame)
+                        @if worst.loading_phase { ", in the loading phase" }
                         small { (format!(
                             " · FLIP {:.4}, of 95 in a hundred pixels {:.4}; {} gaps",
                             worst.accuracy.flip_mean,

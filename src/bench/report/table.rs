@@ -97,6 +97,19 @@ pub(super) fn groups(summary: &Value) -> Vec<Group> {
             ],
         },
         Group {
+            title: "Loading phase",
+            rows: vec![
+                Row("frames", whole("/loading_phase/frames"), ""),
+                Row("frame time, mean", ms("/loading_phase/frame_ms/mean"), ""),
+                Row("frames over 1.1 × target", share("/loading_phase/late_share"), ""),
+                Row("frames after it", whole("/warm/frames"), ""),
+                Row("frame time after it, mean", ms("/warm/frame_ms/mean"), ""),
+                Row("p95", ms("/warm/frame_ms/p95"), ""),
+                Row("frames over 1.1 × target", share("/warm/late_share"), ""),
+                Row("frames that do not show the scene", whole("/frames_without_scene"), ""),
+            ],
+        },
+        Group {
             title: "Toggles (6.5)",
             rows: vec![
                 Row("up", whole("/toggles/up"), ""),
@@ -111,10 +124,15 @@ pub(super) fn groups(summary: &Value) -> Vec<Group> {
     ];
     if summary.pointer("/accuracy").is_some_and(Value::is_object) {
         groups.push(Group {
-            title: "Accuracy",
+            title: "Accuracy after the loading phase",
             rows: vec![
-                Row("frames looked at", whole("/accuracy/frames"), ""),
+                Row("frames looked at", whole("/accuracy/warm_frames"), ""),
                 Row("FLIP, mean", rate("/accuracy/flip_mean/mean"), ""),
+                Row(
+                    "FLIP in the loading phase, mean",
+                    rate("/accuracy/loading_phase/flip_mean/mean"),
+                    "",
+                ),
                 Row("FLIP of the worst frame", rate("/accuracy/flip_mean/max"), ""),
                 Row("FLIP of 95 in a hundred pixels, mean", rate("/accuracy/flip_p95/mean"), ""),
                 Row("SSIM, mean", rate("/accuracy/ssim/mean"), ""),

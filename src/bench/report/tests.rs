@@ -155,7 +155,8 @@ fn frames_that_were_compared_with_the_leaves_have_figures_and_the_worst_pictures
     }
     let [drawn, reference, difference] = [[1u8; 9], [2; 9], [3; 9]].map(Vec::from);
     let accuracy = run.frames[50].accuracy.clone().unwrap();
-    let worst = WorstFrame { frame: 50, accuracy, drawn, reference, difference };
+    let worst =
+        WorstFrame { frame: 50, loading_phase: false, accuracy, drawn, reference, difference };
     let looked = ReferenceContext { every: 10, worst: vec![worst], ..Default::default() };
     let context = Context { reference: Some(looked), ..context(2) };
     let page = page(&run, &context);

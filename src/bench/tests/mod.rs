@@ -158,28 +158,112 @@ fn a_walk_starts_with_the_roots_and_gets_finer_as_nodes_arrive() {
     }
 }
 
-#[test]
-fn what_uploads_take_costs_no_detail() {
-    // Past houses that come into view one after another, at 30 m/s, looking at them. A node takes a fortieth of
-    // a frame to upload.
+/// Past houses that come into view one after another, at 30 m/s, looking at them: nodes arrive in every
+/// frame. Those after the loading phase.
+fn drive_past(upload_ms: f64) -> Vec<FrameRecord> {
     let mut path = walk(300);
     for frame in &mut path.frames {
         frame.pose.position.x *= 20.0;
         frame.pose.rotation = from_angles(UpAxis::Z, 90.0, 0.0, 0.0);
     }
-    let scene = street(20, 5);
-    let replay = |upload_ms: f64| {
-        let mut constants = constants();
-        constants.prices.uploaded_byte = upload_ms / 200.0;
-        let policy = PolicyChoice::new("gain-over-price", &Settings::new()).unwrap();
-        let options = BenchOptions { policy, ..options(1 << 20) };
-        let run = replay_by(&scene, &path, options, constants, None);
-        let frames = &run.frames[60..];
-        assert!(frames.iter().all(|frame| frame.report.arrived > 0));
-        frames.iter().map(|frame| f64::from(frame.report.nodes)).sum::<f64>()
+    let mut constants = constants();
+    constants.prices.uploaded_byte = upload_ms / 200.0;
+    let policy = PolicyChoice::new("gain-over-price", &Settings::new()).unwrap();
+    let options = BenchOptions { policy, ..options(1 << 20) };
+    let mut frames = replay_by(&street(20, 5), &path, options, constants, None).frames;
+    frames.retain(|frame| !frame.report.loading_phase);
+    assert!(frames.len() > 200, "{}", frames.len());
+    frames
+}
+
+#[test]
+fn uploads_and_drawing_fit_into_the_frame_together() {
+    // A node takes up to a quarter of the target to upload.
+    for upload_ms in [0.0, 0.08, 0.3, 0.75] {
+        let frames = drive_past(upload_ms);
+        let uploads = frames.iter().filter(|frame| frame.report.upload_ms > 0.0).count();
+        assert!(upload_ms == 0.0 || uploads > 100, "{uploads}");
+        let late = frames.iter().filter(|frame| frame.report.frame_ms > 1.1 * 3.0).count();
+        assert!(late <= frames.len() / 50, "{late} of {} at {upload_ms} ms", frames.len());
+    }
+}
+
+#[test]
+fn uploads_cost_no_more_detail_than_they_take_time() {
+    let nodes = |frames: &[FrameRecord]| -> f64 {
+        frames.iter().map(|frame| f64::from(frame.report.nodes)).sum()
     };
-    let (without, with) = (replay(0.0), replay(0.08));
-    assert!(with > 0.99 * without, "{with} nodes beside {without}");
+    let without = nodes(&drive_past(0.0));
+    for upload_ms in [0.08, 0.3] {
+        let frames = drive_past(upload_ms);
+        let most_ms = frames.iter().fold(0.0, |most: f64, frame| most.max(frame.report.upload_ms));
+        // A frame of 3 ms, of which 2.5 are for nodes.
+        let least = 1.0 - most_ms / 2.5 - 0.02;
+        let part = nodes(&frames) / without;
+        assert!(part > least, "{part} of the nodes, uploads of {most_ms} ms at most");
+    }
+}
+
+/// FLIP of 0.9 in the loading phase, of 0.1 after it.
+struct Phases;
+
+impl FrameInspector for Phases {
+    fn wants(&self, index: usize, _: bool) -> bool {
+        index.is_multiple_of(2)
+    }
+
+    fn inspect(&mut self, frame: FrameSample<'_>) -> crate::Result<Accuracy> {
+        let flip_mean = if frame.loading_phase { 0.9 } else { 0.1 };
+        Ok(Accuracy { flip_mean, ssim: Some(1.0 - flip_mean), ..Accuracy::default() })
+    }
+}
+
+#[test]
+fn the_loading_phase_is_reported_apart() {
+    let summary_of = |frames: usize, warm_up_frames: u64| {
+        let options = BenchOptions { warm_up_frames, ..options(1 << 20) };
+        let run = replay_before(&street(20, 2), &walk(frames), options.clone(), Some(&mut Phases));
+        let reference = ReferenceContext { every: 2, ..ReferenceContext::default() };
+        let context = Context { reference: Some(reference), ..context(options) };
+        let summary = summary(&run, &context);
+        let page = report_html(&run, &context, &summary).unwrap();
+        (run, summary_text(&summary), page, summary)
+    };
+    let (run, text, page, summary) = summary_of(200, 0);
+    let loading = run.frames.iter().take_while(|frame| frame.report.loading_phase).count();
+    assert!((1..70).contains(&loading), "{loading}");
+    // It ends for good, with the first frame that needs nothing that it has not.
+    assert!(run.frames[loading..].iter().all(|frame| !frame.report.loading_phase));
+    let (first, report) = (&run.frames[0], &run.frames[loading].report);
+    let seconds = run.frames[loading].time_s - first.time_s;
+    assert!((report.arrived, report.waiting) == (0, 0) || seconds >= 2.0, "{report:?}");
+    assert_eq!(summary["loading_phase"]["frames"], loading);
+    assert_eq!(summary["warm"]["frames"], 200 - loading);
+    let looked = &summary["accuracy"];
+    assert_eq!(looked["loading_phase"]["frames"], loading.div_ceil(2));
+    assert_eq!(looked["warm_frames"], 100 - loading.div_ceil(2));
+    assert_eq!(looked["frames"], 100);
+    let close = |value: &serde_json::Value, to: f64| (value.as_f64().unwrap() - to).abs() < 1e-9;
+    assert!(close(&looked["loading_phase"]["flip_mean"]["mean"], 0.9));
+    assert!(close(&looked["flip_mean"]["mean"], 0.1) && close(&looked["flip_mean"]["max"], 0.1));
+    assert!(close(&looked["ssim"]["min"], 0.9));
+    assert!(
+        text.contains("frames of loading") && text.contains("loading phase, FLIP 0.9"),
+        "{text}"
+    );
+    assert!(page.contains("<td>FLIP in the loading phase, mean</td><td>0.9000</td>"));
+
+    // A path that ends within it has no image error, rather than that of what is not loaded.
+    let (_, text, _, summary) = summary_of(1, 0);
+    assert_eq!(summary["accuracy"]["warm_frames"], 0);
+    assert!(summary["accuracy"]["flip_mean"]["mean"].is_null());
+    assert!(summary["warm"]["frame_ms"]["mean"].is_null());
+    assert!(text.contains("--warm-up-frames") && !text.contains("NaN"), "{text}");
+
+    let (_, text, _, summary) = summary_of(20, 200);
+    assert_eq!(summary["loading_phase"]["frames"], 0);
+    assert_eq!(summary["warm"]["frames"], 20);
+    assert!(!text.contains("loading phase") && !text.contains("frames of loading"), "{text}");
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::{Snapshots, process};
+use crate::bench::BrokenFiles;
 use crate::camera::View;
 use crate::engine::{Backend, Drawn, Inspect, NodeOcclusion, lock};
 use crate::loading::{Arrival, LoadingThreads, NodeFiles};
@@ -28,8 +29,7 @@ pub struct GpuBackend<'a> {
     arrived: BTreeMap<u32, Arrival>,
     /// What nodes hide that were uploaded, until it is asked for.
     occlusions: BTreeMap<u32, NodeOcclusion>,
-    /// Files that cannot be used, each once.
-    broken: Vec<String>,
+    broken: BrokenFiles,
     snapshots: Option<Snapshots>,
     /// Metres; nothing nearer is seen.
     near: f32,
@@ -56,7 +56,7 @@ impl<'a> GpuBackend<'a> {
             residency,
             arrived: BTreeMap::new(),
             occlusions: BTreeMap::new(),
-            broken: Vec::new(),
+            broken: BrokenFiles::default(),
             snapshots,
             near,
             start: now,
@@ -64,8 +64,13 @@ impl<'a> GpuBackend<'a> {
         }
     }
 
-    /// Files that could not be used, each with what was wrong.
-    pub fn broken(&self) -> &[String] {
+    /// Begins with files that are known to be of no use.
+    pub fn with_broken(self, broken: BrokenFiles) -> Self {
+        Self { broken, ..self }
+    }
+
+    /// Files that could not be used.
+    pub fn broken(&self) -> &BrokenFiles {
         &self.broken
     }
 
@@ -82,7 +87,7 @@ impl<'a> GpuBackend<'a> {
                 Ok(arrival) => {
                     self.arrived.insert(arrival.node, arrival);
                 }
-                Err(error) => report(&mut self.broken, &error),
+                Err(error) => self.broken.add(&error),
             }
         }
         alive
@@ -98,14 +103,6 @@ impl<'a> GpuBackend<'a> {
     }
 }
 
-/// Adds a file that cannot be used; a picture that several nodes share is named once.
-fn report(broken: &mut Vec<String>, error: &Error) {
-    let what = error.to_string();
-    if !broken.contains(&what) {
-        broken.push(what);
-    }
-}
-
 impl Backend for GpuBackend<'_> {
     fn load_roots(&mut self, residency: &Mutex<Residency>, roots: &[u32]) -> Result<()> {
         for &root in roots {
@@ -118,7 +115,7 @@ impl Backend for GpuBackend<'_> {
                     residency.loaded(root);
                 }
                 Err(error) => {
-                    report(&mut self.broken, &error);
+                    self.broken.add(&error);
                     residency.broken(root);
                 }
             }

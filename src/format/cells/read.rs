@@ -37,7 +37,7 @@ impl Cells {
     /// Reads the cells of an output folder; none where it has no index of them.
     pub fn read(dir: &Path) -> Result<Option<Self>> {
         let path = dir.join(CELLS_FILE);
-        match std::fs::read(&path) {
+        match crate::format::read_regular(&path) {
             Ok(bytes) => Self::from_bytes(&bytes, &path).map(Some),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(error) => Err(Error::input(path, format!("cannot read the cells: {error}"))),

@@ -34,7 +34,7 @@ impl Rims {
     /// Reads the rims of an output folder, which need not have any.
     pub fn read(dir: &Path) -> Result<Self> {
         let path = dir.join(RIMS_FILE);
-        let bytes = std::fs::read(&path)
+        let bytes = crate::format::read_regular(&path)
             .map_err(|error| Error::input(&path, format!("cannot read the rims: {error}")))?;
         Self::from_bytes(&bytes, &path)
     }

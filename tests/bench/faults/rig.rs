@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
 use glam::DVec3;
-use hlod::bench::{ClockConstants, ModelBackend, ModelOcclusions, PolicyChoice, Session};
+use hlod::bench::{ClockConstants, ModelBackend, ModelFiles, PolicyChoice, Session};
 use hlod::camera::{Pose, View, from_angles};
 use hlod::engine::policies::{POLICIES, Settings};
 use hlod::engine::{
@@ -100,7 +100,7 @@ pub struct Ground {
     pub upload_bytes_per_s: u64,
     pub constants: ClockConstants,
     occluders: Option<Arc<Occluders>>,
-    occlusions: Option<Arc<ModelOcclusions>>,
+    files: Option<Arc<ModelFiles>>,
 }
 
 /// What frames are like: noise of 2 %.
@@ -132,7 +132,7 @@ impl Ground {
             upload_bytes_per_s: ResidencyOptions::DEFAULT.upload_bytes_per_s,
             constants: constants(4e-3, 2_000.0),
             occluders: Some(Arc::new(occluders)),
-            occlusions: Some(Arc::new(ModelOcclusions::new(session.files()))),
+            files: Some(Arc::new(ModelFiles::new(session.files()))),
         }
     }
 
@@ -148,7 +148,7 @@ impl Ground {
             upload_bytes_per_s: ResidencyOptions::DEFAULT.upload_bytes_per_s,
             constants: constants(1e-3, 1_000.0),
             occluders: None,
-            occlusions: None,
+            files: None,
         }
     }
 
@@ -221,8 +221,8 @@ pub fn frames(
     let mut policy = choice.make().unwrap();
     let residency = Arc::new(Mutex::new(ground.residency(cap_bytes)));
     let model = ModelBackend::new(&ground.tree, ground.constants, 1);
-    let model = match &ground.occlusions {
-        Some(occlusions) => model.with_occlusions(Arc::clone(occlusions)),
+    let model = match &ground.files {
+        Some(files) => model.with_files(Arc::clone(files), true),
         None => model,
     };
     let at_hand = Arc::new(Mutex::new(Fault::default()));
