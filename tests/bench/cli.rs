@@ -56,7 +56,7 @@ fn help_names_every_option_with_its_unit_and_range() {
         "best-first",
         "--set <CONSTANT=VALUE>",
         "0 or more [default: 0.1]",
-        "KiB, MiB or GiB [default: 1GiB]",
+        "KiB, MiB, GiB or TiB [default: 1GiB]",
         "[default: 64KiB]",
         "a quarter of the bytes of `rgba8`, at a PSNR of some 42 dB",
         "in pixels [default: 1280x720]",
@@ -280,6 +280,36 @@ fn places_that_cannot_be_written_are_found_out_before_the_run() {
     if cfg!(target_os = "linux") {
         run_refused(&place, &["--out", "/proc/hlod"], OUTPUT, &["/proc/hlod"]);
     }
+}
+
+#[test]
+fn results_within_the_built_folder_are_refused_before_the_run() {
+    let place = Place::new(city());
+    let within = &["lies within the folder of the built scene"];
+    for out in ["out", "out/bench", "out/nodes/deep/er", "out/../out/bench"] {
+        run_refused(&place, &["--out", out], OUTPUT, within);
+        refused(&place, &["sweep", "out", "fly.csv", "--out", out], OUTPUT, within);
+        refused(&place, &["policies", "out", "--out", out], OUTPUT, within);
+    }
+    let make_path = ["make-path", "out", "--kind", "fly", "--out", "out/p.csv"];
+    refused(&place, &make_path, OUTPUT, within);
+    // A folder beside it with a name that begins alike.
+    place.bench(&["out", "fly.csv", "--clock", "model", "-q", "--out", "outer"]).success();
+}
+
+#[test]
+fn pictures_of_a_run_that_draws_nothing_are_refused() {
+    let place = Place::new(city());
+    let told = &["--snapshots", "model clock draws nothing", "--clock wall"];
+    run_refused(&place, &["--snapshots", "10"], USAGE, told);
+}
+
+#[test]
+fn caps_above_the_memory_of_the_machine_are_accepted() {
+    let place = Place::new(city());
+    let run = ["out", "fly.csv", "--clock", "model", "-q", "--max-memory", "1TiB", "--out", "r"];
+    place.bench(&run).success();
+    assert_eq!(place.summary("r")["memory"]["cap_bytes"], 1u64 << 40);
 }
 
 #[test]

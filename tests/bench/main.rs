@@ -12,7 +12,7 @@ mod support;
 #[path = "../common/adapter.rs"]
 mod adapter;
 mod bench_support;
-
+mod camera_paths;
 #[cfg(feature = "render")]
 mod cells;
 mod cli;
@@ -22,6 +22,7 @@ mod golden;
 #[cfg(feature = "render")]
 mod mixtures;
 mod model_clock;
+mod model_files;
 mod output;
 #[cfg(feature = "render")]
 mod reference;

@@ -1,22 +1,24 @@
 //! `hlod-bench OUT PATH.csv`: arguments in, exit code out.
 
 mod policies;
+mod progress;
 mod run_args;
 
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use hlod::bench::{
-    BenchOptions, ClockConstants, Context, FrameRecord, Limits, Run, Session, Size, SummaryFile,
-    Sweep, check_output, compare, summary, summary_text, write_run,
+    BenchOptions, ClockConstants, Context, FrameRecord, Limits, Pace, Run, Session, Size,
+    SummaryFile, Sweep, check_output, check_outside_scene, compare, summary, summary_text,
+    write_run,
 };
-use hlod::camera::{self, CameraPath, DEFAULT_FPS, Ground, PathKind};
+use hlod::camera::{self, CameraPath, DEFAULT_FPS, Ground, LONGEST_INTERVAL_S, PathKind};
 use hlod::engine::FarFieldMode;
 use hlod::{Error, Result};
-use indicatif::{ProgressBar, ProgressStyle};
 use policies::PoliciesArgs;
+use progress::Progress;
 use run_args::{Clock, RunArgs, parse_size};
 
 /// Replays a camera path over a built scene and measures frame times, toggles, memory and image error.
@@ -172,6 +174,7 @@ fn make_path(
     seed: u64,
     out: &Path,
 ) -> Result<()> {
+    check_outside_scene(out, dir)?;
     let session = Session::open(dir)?;
     let ground = Ground::read(session.scene(), dir)?;
     let frames = frames.unwrap_or(kind.default_frames());
@@ -181,7 +184,7 @@ fn make_path(
 }
 
 fn replay(arguments: &RunArgs) -> Result<()> {
-    let (_, unusable) = replay_once(arguments)?;
+    let (_, unusable) = replay_once(arguments, true)?;
     unusable.map_or(Ok(()), Err)
 }
 
@@ -197,12 +200,12 @@ fn sweep(targets: &[f64], arguments: &RunArgs) -> Result<()> {
     }
     let mut sweep = Sweep::default();
     let mut first_unusable = None;
-    for &target in targets {
+    for (index, &target) in targets.iter().enumerate() {
         let mut run = arguments.clone();
         run.target_ms = Some(target);
         run.reference_every.get_or_insert(SWEEP_EVERY);
         run.out = arguments.out.join(format!("target-{target}"));
-        let (summary, unusable) = replay_once(&run)?;
+        let (summary, unusable) = replay_once(&run, index == 0)?;
         sweep.summaries.push(summary);
         first_unusable = first_unusable.or(unusable);
     }
@@ -217,25 +220,43 @@ fn sweep(targets: &[f64], arguments: &RunArgs) -> Result<()> {
     first_unusable.map_or(Ok(()), Err)
 }
 
-/// One run, written and told of: its summary, and what is to be said of files that it could not
-/// use.
-fn replay_once(arguments: &RunArgs) -> Result<(serde_json::Value, Option<Error>)> {
-    let (Some(dir), Some(path)) = (&arguments.scene, &arguments.path) else {
+/// Replays a path once, writes and prints the results, and warns of what is odd in the path where
+/// `warns` says so. Its summary, and what is to be said of files that it could not use.
+fn replay_once(arguments: &RunArgs, warns: bool) -> Result<(serde_json::Value, Option<Error>)> {
+    let (Some(dir), Some(file)) = (&arguments.scene, &arguments.path) else {
         return Err(Error::Usage("expected OUT and PATH.csv".into()));
     };
     let mut session = Session::open(dir)?;
-    let path_name = path.display().to_string();
-    let path = camera::read_path(path, session.scene().up)?;
+    let path_name = file.display().to_string();
+    let warn = |what: &str| {
+        if warns {
+            eprintln!("hlod-bench: {}: warning: {what}", file.display());
+        }
+    };
+    let path = played(camera::read_path(file, session.scene().up)?, warn);
     let constants = arguments.constants.as_deref().map(ClockConstants::read).transpose()?;
     let options = arguments.options()?;
     options.check()?;
+    if arguments.clock == Clock::Model && arguments.snapshots.is_some() {
+        return Err(Error::Usage(
+            "--snapshots: the model clock draws nothing; use --clock wall, or --reference-every \
+             for the image error of what would be drawn"
+                .into(),
+        ));
+    }
     let options =
         BenchOptions { far_field: far_field(&mut session, options.far_field)?, ..options };
     check_output(&arguments.out)?;
-    let bar = Bar::new(arguments.quiet, path.frames.len());
-    let job = Job { arguments, session: &session, path: &path, options, constants, bar: &bar };
+    check_outside_scene(&arguments.out, dir)?;
+    session.check_path(&path, file, options.size)?;
+    let progress = ReplayProgress::new(arguments, &path);
+    let job =
+        Job { arguments, session: &session, path: &path, options, constants, progress: &progress };
     let (run, mut context) = run(job)?;
-    bar.bar.finish_and_clear();
+    drop(progress);
+    if let Some(what) = session.unseen_warning(&path, &run) {
+        warn(&what);
+    }
     context.path_name = path_name;
     let summary = summary(&run, &context);
     let files = write_run(&arguments.out, &run, &context, &summary)?;
@@ -243,15 +264,50 @@ fn replay_once(arguments: &RunArgs) -> Result<(serde_json::Value, Option<Error>)
         let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         print(&format!("{}\nwritten: {}\n", summary_text(&summary), files.join(", ")))?;
     }
-    let unusable = context.broken.first().map(|first| {
-        let files = match context.broken.len() {
-            1 => "1 file".to_owned(),
-            count => format!("{count} files"),
-        };
-        let what = "that cannot be used; build again. The first:";
-        Error::input(dir, format!("the run went on without {files} {what} {first}"))
-    });
-    Ok((summary, unusable))
+    Ok((summary, unusable(dir, &context.broken)))
+}
+
+/// What is to be said of files that a run could not use, if there are any.
+fn unusable(dir: &Path, broken: &[String]) -> Option<Error> {
+    let first = broken.first()?;
+    let files = match broken.len() {
+        1 => "1 file".to_owned(),
+        count => format!("{count} files"),
+    };
+    let what = "that cannot be used; build again. The first:";
+    Some(Error::input(dir, format!("the run went on without {files} {what} {first}")))
+}
+
+/// A path as it is played, with warnings of what is played in another way than the file says, and
+/// of what looks wrong in it.
+fn played(path: CameraPath, warn: impl Fn(&str)) -> CameraPath {
+    let gaps = path.long_gaps();
+    if gaps.count > 0 {
+        warn(&format!(
+            "{} of {} gaps between time stamps are longer than {LONGEST_INTERVAL_S} s and are played \
+             as {LONGEST_INTERVAL_S} s; the longest, of {} s, comes after frame {}",
+            gaps.count,
+            path.frames.len() - 1,
+            gaps.longest_s,
+            path.frames[gaps.longest_after].frame
+        ));
+    }
+    let widest_deg = path.frames.iter().fold(0.0, |most: f64, at| most.max(at.pose.fov_y_deg));
+    if widest_deg <= std::f64::consts::PI {
+        warn(&format!(
+            "fov_y_deg is {widest_deg} at most: these look like radians; expected degrees, {:.1} \
+             for this one",
+            widest_deg.to_degrees()
+        ));
+    }
+    if !path.is_without_time() {
+        return path;
+    }
+    warn(&format!(
+        "all {} time stamps are equal: played at {DEFAULT_FPS} frames a second",
+        path.frames.len()
+    ));
+    path.at_rate(DEFAULT_FPS)
 }
 
 /// Reads cells where they are wanted. Where they are drawn only if they pay, none are needed, and what
@@ -278,12 +334,12 @@ struct Job<'a> {
     path: &'a CameraPath,
     options: BenchOptions,
     constants: Option<ClockConstants>,
-    bar: &'a Bar,
+    progress: &'a ReplayProgress<'a>,
 }
 
 #[cfg(feature = "render")]
 fn run(job: Job) -> Result<(Run, Context)> {
-    let Job { arguments, session, path, options, constants, bar } = job;
+    let Job { arguments, session, path, options, constants, progress } = job;
     use hlod::bench::{FrameInspector, Reference, SilhouetteTolerance, Snapshots};
     use hlod::render::{RenderOptions, Renderer, Shading, Side};
     use run_args::ShadingArg;
@@ -319,7 +375,7 @@ fn run(job: Job) -> Result<(Run, Context)> {
     };
     let mut reference = arguments.reference_every.map(reference).transpose()?;
     let inspector = reference.as_mut().map(|reference| reference as &mut dyn FrameInspector);
-    let progress = |frame: &FrameRecord| bar.frame(frame);
+    let progress = |frame: &FrameRecord| progress.frame(frame);
     let (run, mut context) = match &mut renderer {
         None => {
             let constants = constants.unwrap_or_default();
@@ -341,6 +397,7 @@ fn run(job: Job) -> Result<(Run, Context)> {
 #[cfg(feature = "render")]
 fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Result<()> {
     use hlod::render::{RenderOptions, Renderer};
+    check_outside_scene(out, dir)?;
     let session = Session::open(dir)?;
     let mut renderer =
         Renderer::new(&RenderOptions { size: size.0, adapter, ..RenderOptions::default() })?;
@@ -381,12 +438,12 @@ fn calibrate(dir: &Path, adapter: Option<String>, size: Size, out: &Path) -> Res
 
 #[cfg(not(feature = "render"))]
 fn run(job: Job) -> Result<(Run, Context)> {
-    let Job { arguments, session, path, options, constants, bar } = job;
+    let Job { arguments, session, path, options, constants, progress } = job;
     if arguments.clock == Clock::Wall || arguments.reference_every.is_some() {
         return Err(cannot_draw());
     }
     let constants = constants.unwrap_or_default();
-    session.run_model(path, options, constants, None, |frame| bar.frame(frame))
+    session.run_model(path, options, constants, None, |frame| progress.frame(frame))
 }
 
 #[cfg(not(feature = "render"))]
@@ -399,32 +456,40 @@ fn cannot_draw() -> Error {
     Error::NoAdapter("this hlod-bench was compiled without drawing; use --clock model alone".into())
 }
 
-/// Progress on a terminal, and nothing elsewhere.
-struct Bar {
-    bar: ProgressBar,
+/// The progress of a replay. Its steps are milliseconds of the path where frames wait for their
+/// time, and frames otherwise.
+struct ReplayProgress<'a> {
+    progress: Progress,
+    path: &'a CameraPath,
+    paced: bool,
+    done: std::cell::Cell<usize>,
 }
 
-impl Bar {
-    fn new(quiet: bool, frames: usize) -> Self {
-        let hidden = quiet || !std::io::stderr().is_terminal();
-        let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(frames as u64) };
-        let template = "{wide_bar} {pos}/{len} frames, {msg}, {eta} left";
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
-        Self { bar }
+impl<'a> ReplayProgress<'a> {
+    fn new(arguments: &RunArgs, path: &'a CameraPath) -> Self {
+        let paced = arguments.clock == Clock::Wall && arguments.pace == Pace::Recorded;
+        let steps = (0..path.frames.len()).map(|index| steps(path, index, paced)).sum();
+        let progress = Progress::new(arguments.quiet, steps, "preparing the first frame");
+        Self { progress, path, paced, done: std::cell::Cell::new(0) }
     }
 
     fn frame(&self, frame: &FrameRecord) -> bool {
-        self.bar.inc(1);
-        if !self.bar.is_hidden() {
-            self.bar.set_message(format!(
-                "{:.1} ms, {} triangles",
-                frame.report.frame_ms, frame.report.triangles
-            ));
-        }
+        let index = self.done.replace(self.done.get() + 1);
+        self.progress.advance(steps(self.path, index, self.paced), || {
+            format!(
+                "{}/{} frames, {:.1} ms, {} triangles",
+                index + 1,
+                self.path.frames.len(),
+                frame.report.frame_ms,
+                frame.report.triangles
+            )
+        });
         true
     }
+}
+
+fn steps(path: &CameraPath, index: usize, paced: bool) -> u64 {
+    if paced { ((path.interval_s(index) * 1e3) as u64).max(1) } else { 1 }
 }
 
 /// Writes to the standard output; a reader that went away is none of our business.

@@ -5,14 +5,17 @@ use std::path::PathBuf;
 use clap::Args;
 use hlod::Result;
 use hlod::bench::policies::{Inspected, PoliciesPlan, PoliciesTable, PolicyRun};
-use hlod::bench::{BenchOptions, ClockConstants, FrameInspector, Session, Size, check_output};
+use hlod::bench::{
+    BenchOptions, ClockConstants, FrameInspector, FrameRecord, Session, Size, check_output,
+    check_outside_scene,
+};
 use hlod::camera::{self, DEFAULT_FPS, Ground, PathKind};
 use hlod::engine::policies::POLICIES;
 use hlod::runtime::residency::ResidencyOptions;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use super::print;
+use super::progress::Progress;
 use super::run_args::{Switch, parse_size};
+use super::{print, unusable};
 use hlod::bytes::Bytes;
 
 /// Noise of a frame's time and stalls, where no constants are given: those of a desktop machine
@@ -70,7 +73,7 @@ pub struct PoliciesArgs {
     /// Constants of the model clock that `calibrate` wrote [default: lavapipe's, with noise]
     #[arg(long, value_name = "CLOCK.json")]
     constants: Option<PathBuf>,
-    /// Memory cap in bytes, loads in progress included; with KiB, MiB or GiB
+    /// Memory cap in bytes, loads in progress included; with KiB, MiB, GiB or TiB
     #[arg(long, value_name = "BYTES", default_value_t = Bytes(ResidencyOptions::DEFAULT.max_memory_bytes))]
     max_memory: Bytes,
     /// Width and height of the image, 1-16384 each, in pixels
@@ -106,6 +109,9 @@ pub fn policies(arguments: &PoliciesArgs) -> Result<()> {
     let plan = plan(arguments);
     plan.check()?;
     check_output(&arguments.out)?;
+    for scene in &arguments.scenes {
+        check_outside_scene(&arguments.out, scene)?;
+    }
     let clock = match &arguments.constants {
         Some(path) => ClockConstants::read(path)?,
         None => ClockConstants {
@@ -115,7 +121,11 @@ pub fn policies(arguments: &PoliciesArgs) -> Result<()> {
             ..ClockConstants::default()
         },
     };
-    let bar = bar(arguments, plan.runs().len() * arguments.scenes.len());
+    let runs = plan.runs().len() * arguments.scenes.len();
+    let steps = (runs * plan.frames) as u64;
+    let progress = Progress::new(arguments.quiet, steps, "reading the first scene");
+    let mut run_number = 0;
+    let mut first_unusable = None;
     let mut table = PoliciesTable::default();
     for dir in &arguments.scenes {
         let mut session = Session::open(dir)?;
@@ -126,26 +136,32 @@ pub fn policies(arguments: &PoliciesArgs) -> Result<()> {
         let name = dir
             .file_name()
             .map_or_else(|| dir.display().to_string(), |name| name.to_string_lossy().into_owned());
-        let mut runs = Vec::new();
+        let mut of_scene = Vec::new();
         let mut reference = reference(arguments, &session)?;
         for key in plan.runs() {
-            bar.set_message(format!("{name}, {:?}, {}", key.path, key.policy));
+            run_number += 1;
             let path = camera::make_path(&ground, key.path, plan.frames, DEFAULT_FPS, key.seed)?;
             let (options, clock) = plan.settings(&key, &clock)?;
             let inspector = reference.as_mut().map(|at| at as &mut dyn FrameInspector);
-            let (run, _) = session.run_model(&path, options, clock, inspector, |_| true)?;
-            runs.push(PolicyRun::new(&name, key, &run, arguments.inspected()));
-            bar.inc(1);
+            let message =
+                || format!("run {run_number} of {runs}: {name}, {:?}, {}", key.path, key.policy);
+            let frame = |_: &FrameRecord| {
+                progress.advance(1, message);
+                true
+            };
+            let (run, context) = session.run_model(&path, options, clock, inspector, frame)?;
+            first_unusable = first_unusable.or(unusable(dir, &context.broken));
+            of_scene.push(PolicyRun::new(&name, key, &run, arguments.inspected()));
         }
-        table.add(runs);
+        table.add(of_scene);
     }
-    bar.finish_and_clear();
+    drop(progress);
     let files = table.write(&arguments.out)?;
     if !arguments.quiet {
         let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         print(&format!("{}written: {}\n", table.text(), files.join(", ")))?;
     }
-    Ok(())
+    first_unusable.map_or(Ok(()), Err)
 }
 
 fn plan(arguments: &PoliciesArgs) -> PoliciesPlan {
@@ -169,20 +185,6 @@ fn plan(arguments: &PoliciesArgs) -> PoliciesPlan {
             ..BenchOptions::default()
         },
     }
-}
-
-fn bar(arguments: &PoliciesArgs, runs: usize) -> ProgressBar {
-    use std::io::IsTerminal;
-    if arguments.quiet || !std::io::stderr().is_terminal() {
-        return ProgressBar::hidden();
-    }
-    let bar = ProgressBar::new(runs as u64);
-    if let Ok(style) =
-        ProgressStyle::with_template("{wide_bar} {pos}/{len} runs, {msg}, {eta} left")
-    {
-        bar.set_style(style);
-    }
-    bar
 }
 
 impl PoliciesArgs {

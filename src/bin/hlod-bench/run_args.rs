@@ -38,7 +38,8 @@ pub struct RunArgs {
     /// Seed of the model clock's noise and stalls
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     pub seed: u64,
-    /// Warm-up frames at the first pose, before the log begins
+    /// Warm-up frames at the first pose, before the log begins. Image error leaves out the loading
+    /// phase, two seconds at most, with or without them
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub warm_up_frames: u64,
     /// Print nothing but errors
@@ -65,7 +66,7 @@ pub struct RunArgs {
     #[arg(long, value_enum, default_value_t = FarFieldArg::Auto, help_heading = "Selection")]
     pub far_field: FarFieldArg,
 
-    /// maxMemory: memory cap in bytes, loads in progress included; with KiB, MiB or GiB
+    /// maxMemory: memory cap in bytes, loads in progress included; with KiB, MiB, GiB or TiB
     #[arg(long, value_name = "BYTES", default_value_t = Bytes(RESIDENCY.max_memory_bytes), help_heading = "Memory and loading")]
     pub max_memory: Bytes,
     /// Chunk of a file that is read before the most important node is determined again, in bytes
