@@ -1,4 +1,8 @@
 //! Decoding of textures to 8-bit RGB or RGBA.
+//!
+//! The format is recognised by a file's content, never by its name.
+
+mod tga;
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -6,6 +10,7 @@ use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::{Path, PathBuf};
 
 use image::{DynamicImage, ImageReader};
+use tga::Header;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
@@ -19,6 +24,9 @@ const LONGEST_SIDE: u32 = 32_768;
 
 /// Most texels of an image: 2^29, which is 1.5 GiB as RGB.
 const MOST_TEXELS: u64 = 1 << 29;
+
+/// The formats that are read, for messages.
+const EXPECTED: &str = "expected JPEG, PNG, BMP, TGA, TIFF, WebP or GIF";
 
 /// A decoded image, rows from the top, sRGB-encoded.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,7 +72,7 @@ fn without_alpha(rgba: &[u8]) -> Vec<u8> {
     rgba.as_chunks::<4>().0.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect()
 }
 
-/// Reads and decodes a texture: JPEG, PNG, and the other formats that `image` is built with.
+/// Reads and decodes a texture: JPEG, PNG, BMP, TGA, TIFF, WebP or GIF (its first frame).
 ///
 /// 16-bit, grey and palette images become 8-bit RGB. The result is RGBA only where some alpha is
 /// below 255, from the image itself or from its opacity file, which may be of another size.
@@ -147,12 +155,28 @@ fn size_of(mut reader: impl BufRead + Seek) -> Result<(u32, u32), String> {
         }
         reader.rewind().map_err(|error| error.to_string())?;
     }
-    let (width, height) = ImageReader::new(reader)
-        .with_guessed_format()
-        .map_err(|error| error.to_string())?
-        .into_dimensions()
-        .map_err(|error| error.to_string())?;
+    if let Some(header) = tga_header(reader.fill_buf().map_err(|error| error.to_string())?) {
+        return check_size(header.width, header.height);
+    }
+    let (width, height) =
+        recognised(reader)?.into_dimensions().map_err(|error| error.to_string())?;
     check_size(width, height)
+}
+
+/// The header of a TGA, from a file's first bytes; `None` for every other format.
+fn tga_header(head: &[u8]) -> Option<Header> {
+    image::guess_format(head).is_err().then(|| Header::read(head)).flatten()
+}
+
+/// A reader of the format that the content announces.
+fn recognised<R: BufRead + Seek>(reader: R) -> Result<ImageReader<R>, String> {
+    let reader =
+        ImageReader::new(reader).with_guessed_format().map_err(|error| error.to_string())?;
+    match reader.format() {
+        Some(format) if format.reading_enabled() => Ok(reader),
+        Some(format) => Err(format!("is {format:?}; {EXPECTED}")),
+        None => Err(format!("is not an image of a known format; {EXPECTED}")),
+    }
 }
 
 fn jpeg_options() -> DecoderOptions {
@@ -174,9 +198,10 @@ fn decode(bytes: &[u8]) -> Result<DecodedTexture, String> {
         }
         // What the fast path cannot do (CMYK, for one) is left to `image`.
     }
-    let mut reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|error| error.to_string())?;
+    if let Some(header) = tga_header(bytes) {
+        return header.decode(bytes).map(from_image);
+    }
+    let mut reader = recognised(Cursor::new(bytes))?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(LONGEST_SIDE);
     limits.max_image_height = Some(LONGEST_SIDE);
@@ -287,6 +312,143 @@ mod tests {
         }
     }
 
+    /// Colours of a test image: `x` and `y` from the top left.
+    fn color(x: usize, y: usize) -> [u8; 4] {
+        [(40 * x) as u8, (90 * y) as u8, (7 * x + 3 * y) as u8, (200 + 10 * x + y) as u8]
+    }
+
+    const TGA_SIZE: [usize; 2] = [5, 3];
+
+    /// A TGA of [`color`]: `kind` 1 (colour map), 2 (colours) or 3 (grey) and, for run-length encoding, 8 more.
+    /// Bits 5 and 4 of `descriptor` say that rows start at the top and pixels at the right.
+    fn tga(kind: u8, bits: u8, descriptor: u8) -> Vec<u8> {
+        let [width, height] = TGA_SIZE;
+        let is_mapped = kind & 7 == 1;
+        let pixel = |[r, g, b, a]: [u8; 4]| match bits {
+            8 => vec![r],
+            15 | 16 if kind & 7 == 3 => vec![r, a],
+            15 | 16 => {
+                let packed = u16::from(r >> 3) << 10 | u16::from(g >> 3) << 5 | u16::from(b >> 3);
+                packed.to_le_bytes().to_vec()
+            }
+            24 => vec![b, g, r],
+            _ => vec![b, g, r, a],
+        };
+        let mut order = Vec::new();
+        for row in 0..height {
+            for column in 0..width {
+                let y = if descriptor & 0x20 != 0 { row } else { height - 1 - row };
+                let x = if descriptor & 0x10 != 0 { width - 1 - column } else { column };
+                order.push([x, y]);
+            }
+        }
+        let mut file = vec![3, u8::from(is_mapped), kind, 0, 0];
+        file.extend([if is_mapped { (width * height) as u8 } else { 0 }, 0]);
+        file.extend([if is_mapped { bits } else { 0 }, 0, 0, 0, 0]);
+        file.extend([width as u8, 0, height as u8, 0]);
+        file.extend([if is_mapped { 8 } else { bits }, descriptor]);
+        file.extend(b"id!");
+        if is_mapped {
+            file.extend((0..width * height).flat_map(|at| pixel(color(at % width, at / width))));
+        }
+        let pixels = order.iter().map(|&[x, y]| match is_mapped {
+            true => vec![(y * width + x) as u8],
+            false => pixel(color(x, y)),
+        });
+        for (number, pixel) in pixels.enumerate() {
+            match (kind & 8 != 0, number) {
+                (true, 0) => file.push(0x80),
+                (true, 1) => file.push((width * height - 2) as u8),
+                _ => {}
+            }
+            file.extend(pixel);
+        }
+        file
+    }
+
+    #[test]
+    fn tga_files_of_every_kind_and_origin_are_read() {
+        let [width, height] = TGA_SIZE;
+        for kind in [1, 2, 3, 9, 10, 11] {
+            let depths: &[u8] = if kind & 7 == 3 { &[8, 16] } else { &[15, 16, 24, 32] };
+            for (bits, origin) in depths.iter().flat_map(|&bits| [0, 1, 2, 3].map(|at| (bits, at)))
+            {
+                // Files declare 0, too few or all attribute bits.
+                for declared in [0, 1, 8] {
+                    let what = format!("kind {kind}, {bits} bits, origin {origin}, {declared}");
+                    let source = embedded(tga(kind, bits, origin << 4 | declared));
+                    assert_eq!(texture_size(&source).unwrap(), (5, 3), "{what}");
+                    let image = decode_texture(&source).unwrap();
+                    let has_alpha = bits == 32 || (bits == 16 && kind & 7 == 3);
+                    let channels = if has_alpha && declared > 0 { 4 } else { 3 };
+                    assert_eq!(usize::from(image.channels), channels, "{what}");
+                    let expected = (0..width * height).flat_map(|at| {
+                        let mut texel = color(at % width, at / width);
+                        match (kind & 7 == 3, bits) {
+                            (true, _) => texel[..3].fill(color(at % width, at / width)[0]),
+                            (_, 15 | 16) => texel = texel.map(|part| part >> 3 << 3),
+                            _ => {}
+                        }
+                        texel.into_iter().take(channels).collect::<Vec<_>>()
+                    });
+                    // Five bits become eight by one of two common roundings.
+                    let tolerance = if bits < 24 && kind & 7 != 3 { 8 } else { 0 };
+                    let pairs = image.pixels.iter().zip(expected);
+                    assert!(pairs.clone().count() == 15 * channels, "{what}");
+                    for (found, expected) in pairs {
+                        assert!(
+                            found.abs_diff(expected) <= tolerance,
+                            "{what}: {found} {expected}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_zero_alpha_channel_of_a_tga_is_ignored() {
+        let mut file = tga(2, 32, 0x28);
+        file[21..].as_chunks_mut::<4>().0.iter_mut().for_each(|texel| texel[3] = 0);
+        assert_eq!(decode_texture(&embedded(file)).unwrap().channels, 3);
+    }
+
+    #[test]
+    fn formats_are_recognised_by_content_whatever_the_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let image = DynamicImage::from(image::RgbImage::from_fn(5, 3, |x, y| {
+            let [r, g, b, _] = color(x as usize, y as usize);
+            image::Rgb([r, g, b])
+        }));
+        let mut files = vec![tga(2, 24, 0), tga(10, 24, 0x20)];
+        for format in [ImageFormat::Png, ImageFormat::Bmp, ImageFormat::Tiff, ImageFormat::WebP] {
+            files.push(encoded(&image, format));
+        }
+        files.push(encoded(&image.to_rgba8().into(), ImageFormat::Gif));
+        for (number, bytes) in files.into_iter().enumerate() {
+            for name in ["a.jpg", "a.tga", "a.png", "a"] {
+                let file = folder.path().join(name);
+                std::fs::write(&file, &bytes).unwrap();
+                let source =
+                    TextureSource { data: TextureData::File(file), ..embedded(Vec::new()) };
+                for source in [source, embedded(bytes.clone())] {
+                    assert_eq!(texture_size(&source).unwrap(), (5, 3), "{number} {name}");
+                    let found = decode_texture(&source).unwrap();
+                    assert_eq!(found.pixels, image.to_rgb8().into_raw(), "{number} {name}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn unknown_formats_are_named_with_those_that_are_read() {
+        for bytes in [&b"\xabKTX 20\xbb\r\n\x1a\n"[..], b"DDS |\0\0\0", b"text text text text text"]
+        {
+            let error = decode_texture(&embedded(bytes.to_vec())).unwrap_err().to_string();
+            assert!(error.contains("expected JPEG, PNG, BMP, TGA"), "{error}");
+        }
+    }
+
     #[test]
     fn opacity_files_of_another_size_are_resampled() {
         let folder = tempfile::tempdir().unwrap();
@@ -318,7 +480,7 @@ mod tests {
     fn every_truncation_gives_an_image_or_an_error() {
         let jpeg = encoded(&two_texels(255).to_rgb8().into(), ImageFormat::Jpeg);
         let png = encoded(&two_texels(9), ImageFormat::Png);
-        for bytes in [jpeg, png] {
+        for bytes in [jpeg, png, tga(1, 16, 0), tga(2, 32, 8), tga(10, 24, 0)] {
             for length in 0..bytes.len() {
                 let source = embedded(bytes[..length].to_vec());
                 let _ = decode_texture(&source);
