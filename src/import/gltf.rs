@@ -1,8 +1,10 @@
 //! glTF 2.0 and GLB.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::Path;
 
+use glam::{DMat4, DQuat, DVec3};
 use gltf_json::mesh::{Mode, Primitive, Semantic};
 use gltf_json::validation::Checked;
 use gltf_json::{Index, Root};
@@ -11,21 +13,23 @@ use serde_json::Value;
 use super::clean::{CleanStats, clean};
 use super::gltf_buffers::{Buffers, container};
 use super::gltf_materials::{GltfMaterial, Materials, texture_images};
-use super::gltf_nodes::{Instance, instances};
+use super::gltf_meshopt::Compression;
+use super::gltf_nodes::{InstanceAccessors, Placement, placements, unit_quaternion};
+use super::gltf_unread;
 use super::paths::Finder;
 use super::vertices::NONE;
 use crate::color::unorm16;
 use crate::mesh::{Group, Model, Part, UpAxis, Warnings};
 use crate::{Error, Result};
 
-/// Extensions without which a file that requires them would look wrong, and that are read.
-const READ_EXTENSIONS: [&str; 5] = [
-    "KHR_texture_transform",
-    "KHR_materials_unlit",
-    "KHR_materials_pbrSpecularGlossiness",
-    "KHR_mesh_quantization",
-    "EXT_texture_webp",
-];
+/// Bytes of a GLB before its JSON: its header and that of the first chunk.
+const GLB_HEAD_BYTES: u64 = 20;
+
+/// Most triangles that a file may add by placing its meshes more than once: 2^26, a few gigabytes.
+const MOST_REPEATED_TRIANGLES: u64 = 1 << 26;
+
+/// Triangles that take as much memory as a part has beside them.
+const PART_TRIANGLES: u64 = 8;
 
 /// Reads the glTF or GLB at `path`.
 pub(super) fn load(path: &Path) -> Result<Model> {
@@ -35,28 +39,59 @@ pub(super) fn load(path: &Path) -> Result<Model> {
     read(path, &bytes).map_err(|what| Error::input(path, what)).and_then(super::assemble)
 }
 
+/// `asset.copyright`, from the JSON alone; `None` if there is none or it cannot be read.
+pub(super) fn copyright(path: &Path) -> Option<String> {
+    #[derive(serde::Deserialize)]
+    struct Document {
+        asset: Asset,
+    }
+    #[derive(serde::Deserialize)]
+    struct Asset {
+        copyright: String,
+    }
+    let mut file = super::open(path).ok()?;
+    let mut bytes = Vec::new();
+    file.by_ref().take(GLB_HEAD_BYTES).read_to_end(&mut bytes).ok()?;
+    if bytes.starts_with(b"glTF") {
+        let length = u32::from_le_bytes(*bytes.get(12..)?.first_chunk()?);
+        bytes.clear();
+        file.take(length.into()).read_to_end(&mut bytes).ok()?;
+    } else {
+        file.read_to_end(&mut bytes).ok()?;
+    }
+    let document: Document = serde_json::from_slice(without_mark(&bytes)).ok()?;
+    Some(document.asset.copyright)
+}
+
+/// JSON without the byte-order mark that some editors begin a text with.
+fn without_mark(json: &[u8]) -> &[u8] {
+    json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json)
+}
+
 fn read(path: &Path, bytes: &[u8]) -> Result<Model, String> {
     if bytes.is_empty() {
         return Err("is empty; expected glTF 2.0".to_owned());
     }
     let (json, binary) = container(bytes)?;
-    let mut json: Value =
-        serde_json::from_slice(json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json))
-            .map_err(|error| format!("is not glTF: {error}"))?;
+    let mut json: Value = serde_json::from_slice(without_mark(json))
+        .map_err(|error| format!("is not glTF: {error}"))?;
     let version = json["asset"]["version"].as_str().unwrap_or("unknown");
     if !version.starts_with("2.") {
         return Err(format!("is glTF version {version}; expected 2.0"));
     }
     let mut warnings = Warnings::default();
-    check_extensions(path, &json, &mut warnings)?;
-    let placed = instances(&json)?;
+    gltf_unread::check_required(&json)?;
+    let placements = placements(&json)?;
+    gltf_unread::warn(path, &json, &placements, &mut warnings);
     let images = texture_images(&json);
+    let compression = Compression::read(&json)?;
     let root = typed(&mut json)?;
     drop(json);
+    check_repeats(&root, &placements)?;
 
     let mut finder = Finder::new(path);
     let mut dependencies = vec![path.to_path_buf()];
-    let buffers = Buffers::read(&root, binary, &mut finder, &mut dependencies)?;
+    let buffers = Buffers::read(&root, &compression, binary, &mut finder, &mut dependencies)?;
     let mut scene = Scene {
         path,
         root: &root,
@@ -70,8 +105,8 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Model, String> {
         groups: Vec::new(),
         parts: Vec::new(),
     };
-    for instance in &placed {
-        scene.add(instance).map_err(|what| format!("node {}: {what}", instance.node))?;
+    for placement in &placements {
+        scene.add(placement).map_err(|what| format!("node {}: {what}", placement.node))?;
     }
     if scene.parts.is_empty() && scene.stats == CleanStats::default() {
         return Err("no triangle in any mesh of its scene; expected at least one".to_owned());
@@ -91,23 +126,35 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Model, String> {
     })
 }
 
-/// Refuses, by name, what a file requires and is not read.
-fn check_extensions(path: &Path, json: &Value, warnings: &mut Warnings) -> Result<(), String> {
-    let required = json["extensionsRequired"].as_array().map_or(&[][..], Vec::as_slice);
-    let mut refused = Vec::new();
-    for name in required.iter().filter_map(Value::as_str) {
-        if READ_EXTENSIONS.contains(&name) {
-        } else if name.starts_with("KHR_materials_") || name == "KHR_lights_punctual" {
-            // Reflections and light: the diffuse texture, all that is kept, is there without.
-            warnings.add(format!("{}: extension {name}, ignored", path.display()), 1);
-        } else {
-            refused.push(name);
-        }
+/// Refuses a file that places its meshes so often that their triangles do not fit in memory.
+fn check_repeats(root: &Root, placements: &[Placement]) -> Result<(), String> {
+    let elements = |accessor: Option<usize>| {
+        accessor.and_then(|index| root.accessors.get(index)).map(|accessor| accessor.count.0)
+    };
+    let mut is_placed = vec![false; root.meshes.len()];
+    let mut repeated = 0_u64;
+    for placement in placements {
+        let Some(mesh) = root.meshes.get(placement.mesh) else { continue };
+        let triangles = mesh.primitives.iter().map(|primitive| {
+            let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+            let corners = primitive.indices.or(positions.copied());
+            let corners = elements(corners.map(|index| index.value())).unwrap_or(0);
+            let is_list = primitive.mode == Checked::Valid(Mode::Triangles);
+            (if is_list { corners / 3 } else { corners }).saturating_add(PART_TRIANGLES)
+        });
+        let triangles = triangles.fold(0, u64::saturating_add);
+        let placed = elements(placement.instances.and_then(|instances| instances.any()));
+        let first = u64::from(!std::mem::replace(&mut is_placed[placement.mesh], true));
+        let repeats = placed.unwrap_or(1).saturating_sub(first);
+        repeated = repeated.saturating_add(repeats.saturating_mul(triangles));
     }
-    if refused.is_empty() {
-        return Ok(());
+    if repeated > MOST_REPEATED_TRIANGLES {
+        return Err(format!(
+            "places its meshes so often that {repeated} triangles are added; expected at most \
+             {MOST_REPEATED_TRIANGLES}; divide the file"
+        ));
     }
-    Err(format!("requires {}, which is not read; export it without", refused.join(", ")))
+    Ok(())
 }
 
 /// The JSON as gltf's types.
@@ -147,46 +194,107 @@ struct Scene<'a> {
     parts: Vec<Part>,
 }
 
+/// A primitive's triangles in the coordinates of its mesh.
+struct Decoded {
+    positions: Vec<[f64; 3]>,
+    /// Three per triangle, into the other fields.
+    corners: Vec<u32>,
+    /// One per position if the material has a texture, else empty.
+    texcoords: Vec<[f32; 2]>,
+    /// One per position.
+    colors: Option<Vec<[u16; 4]>>,
+}
+
 impl Scene<'_> {
-    /// Adds a placed mesh as a group of its own.
-    fn add(&mut self, instance: &Instance) -> Result<(), String> {
+    /// Adds a placed mesh: each instance as a group of its own.
+    fn add(&mut self, placement: &Placement) -> Result<(), String> {
         let mesh = self
             .root
             .meshes
-            .get(instance.mesh)
-            .ok_or_else(|| format!("there is no mesh {}", instance.mesh))?;
-        let group = self.groups.len() as u32;
-        let mut parts: Vec<Part> = Vec::new();
+            .get(placement.mesh)
+            .ok_or_else(|| format!("there is no mesh {}", placement.mesh))?;
+        let transforms = self.transforms(placement)?;
+        let mut instances: Vec<Vec<Part>> = vec![Vec::new(); transforms.len()];
         for (number, primitive) in mesh.primitives.iter().enumerate() {
+            let in_primitive =
+                |what| format!("mesh {}, primitive {number}: {what}", placement.mesh);
             let material = primitive.material.map(|material| material.value());
             if let Some(index) = material.filter(|index| *index >= self.root.materials.len()) {
                 return Err(format!("there is no material {index}"));
             }
             let material = self.material(material);
-            let at = parts.iter().position(|part| part.material == material);
-            let mut part = match at {
-                Some(at) => std::mem::take(&mut parts[at]),
-                None => Part { group, material, ..Part::default() },
+            let Some(decoded) = self.decode(primitive, material).map_err(in_primitive)? else {
+                continue;
             };
-            self.append(&mut part, primitive, instance)
-                .map_err(|what| format!("mesh {}, primitive {number}: {what}", instance.mesh))?;
-            match at {
-                Some(at) => parts[at] = part,
-                None => parts.push(part),
+            for (parts, world) in instances.iter_mut().zip(&transforms) {
+                let at = parts.iter().position(|part| part.material == material);
+                let at = at.unwrap_or_else(|| {
+                    parts.push(Part { material, ..Part::default() });
+                    parts.len() - 1
+                });
+                append(&mut parts[at], &decoded, world).map_err(in_primitive)?;
             }
         }
-        for part in &mut parts {
-            clean(part, &mut self.stats);
-        }
-        parts.retain(|part| !part.indices.is_empty());
-        if !parts.is_empty() {
-            let node = self.root.nodes.get(instance.node).and_then(|node| node.name.clone());
-            let name =
-                [node, mesh.name.clone()].into_iter().flatten().find(|name| !name.is_empty());
-            self.groups.push(Group { name: name.unwrap_or_else(|| super::stem(self.path)) });
-            self.parts.append(&mut parts);
+        let node = self.root.nodes.get(placement.node).and_then(|node| node.name.clone());
+        let name = [node, mesh.name.clone()].into_iter().flatten().find(|name| !name.is_empty());
+        let name = name.unwrap_or_else(|| super::stem(self.path));
+        for mut parts in instances {
+            for part in &mut parts {
+                part.group = self.groups.len() as u32;
+                clean(part, &mut self.stats);
+            }
+            parts.retain(|part| !part.indices.is_empty());
+            if !parts.is_empty() {
+                self.groups.push(Group { name: name.clone() });
+                self.parts.append(&mut parts);
+            }
         }
         Ok(())
+    }
+
+    /// Where a mesh is placed: the transform of each instance, from its coordinates to the scene's.
+    fn transforms(&self, placement: &Placement) -> Result<Vec<DMat4>, String> {
+        let mut world = placement.world;
+        if let Some(skin) = placement.skin.and_then(|skin| self.root.skins.get(skin))
+            && let Some(accessor) = skin.inverse_bind_matrices
+            && let Some(first) = self.buffers.vectors::<16>(accessor)?.first()
+        {
+            world *= DMat4::from_cols_array(first);
+        }
+        let Some(accessors) = placement.instances else { return Ok(vec![world]) };
+        let InstanceAccessors { translation, rotation, scale } = accessors;
+        let translations = self.instance_vectors(translation)?;
+        let rotations = self.instance_vectors(rotation)?;
+        let scales = self.instance_vectors(scale)?;
+        let lengths = [
+            translations.as_ref().map(Vec::len),
+            rotations.as_ref().map(Vec::len),
+            scales.as_ref().map(Vec::len),
+        ];
+        let count = lengths.into_iter().flatten().next().unwrap_or(0);
+        if let Some(other) = lengths.into_iter().flatten().find(|length| *length != count) {
+            return Err(format!(
+                "EXT_mesh_gpu_instancing: expected as many of each attribute, found {count} and {other}"
+            ));
+        }
+        let transform = |at: usize| {
+            let translation = translations.as_ref().map_or(DVec3::ZERO, |all| all[at].into());
+            let rotation =
+                rotations.as_ref().map_or(DQuat::IDENTITY, |all| unit_quaternion(all[at]));
+            let scale = scales.as_ref().map_or(DVec3::ONE, |all| all[at].into());
+            world * DMat4::from_scale_rotation_translation(scale, rotation, translation)
+        };
+        Ok((0..count).map(transform).collect())
+    }
+
+    fn instance_vectors<const N: usize>(
+        &self,
+        accessor: Option<usize>,
+    ) -> Result<Option<Vec<[f64; N]>>, String> {
+        let Some(index) = accessor else { return Ok(None) };
+        let index = u32::try_from(index).map_err(|_| format!("there is no accessor {index}"))?;
+        let vectors = self.buffers.vectors(Index::new(index));
+        vectors.map(Some).map_err(|what| format!("EXT_mesh_gpu_instancing: {what}"))
     }
 
     fn material(&mut self, index: Option<usize>) -> u32 {
@@ -200,40 +308,30 @@ impl Scene<'_> {
         material
     }
 
-    /// Adds a primitive's triangles and the vertices that they use to `part`.
-    fn append(
-        &mut self,
-        part: &mut Part,
-        primitive: &Primitive,
-        instance: &Instance,
-    ) -> Result<(), String> {
+    /// The triangles of a primitive with the attributes that its material uses; `None` if it has none.
+    fn decode(&mut self, primitive: &Primitive, material: u32) -> Result<Option<Decoded>, String> {
         let Checked::Valid(mode) = primitive.mode else {
             return Err("unknown mode".to_owned());
         };
         let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
         let Some(position_accessor) = attribute(Semantic::Positions) else {
             // Nothing is drawn without positions (glTF 2.0, section 3.7.2.1).
-            return Ok(());
+            return Ok(None);
         };
         if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
             self.stats.not_triangles += 1;
-            return Ok(());
+            return Ok(None);
         }
         let positions: Vec<[f64; 3]> = self.buffers.vectors(position_accessor)?;
         let count = positions.len();
-        let mut corners = match primitive.indices {
+        let corners = match primitive.indices {
             Some(accessor) => self.buffers.indices(accessor)?,
             None => (0..u32::try_from(count).map_err(|_| "too many vertices")?).collect(),
         };
         if let Some(index) = corners.iter().find(|index| **index as usize >= count) {
             return Err(format!("vertex index {index} of {count}"));
         }
-        corners = triangles(corners, mode);
-        if instance.world.determinant() < 0.0 {
-            // A mirrored mesh shows its triangles from behind.
-            corners.as_chunks_mut::<3>().0.iter_mut().for_each(|corner| corner.swap(1, 2));
-        }
-        let made = &self.materials[part.material as usize];
+        let made = &self.materials[material as usize];
         let texcoords: Option<Vec<[f64; 2]>> = match made.material.texture {
             Some(_) => attribute(Semantic::TexCoords(made.texcoord_set))
                 .map(|accessor| self.buffers.vectors(accessor))
@@ -250,46 +348,37 @@ impl Scene<'_> {
                 ));
             }
         }
+        let mut corners = triangles(corners, mode);
+        // Nodes of this crate's own results end with skirts, which are no surface.
+        let skirts = primitive.extras.as_ref().and_then(|extras| {
+            serde_json::from_str::<Value>(extras.get()).ok()?["skirt_triangles"].as_u64()
+        });
+        let skirts = usize::try_from(skirts.unwrap_or(0)).unwrap_or(usize::MAX);
+        corners.truncate(corners.len().saturating_sub(skirts.saturating_mul(3)));
         let textured = made.material.texture.is_some();
         if textured && texcoords.is_none() {
             self.stats.untextured_faces += corners.len() as u64 / 3;
         }
 
         // Only what the triangles use: primitives often share accessors much larger than they.
-        let first = corners.iter().copied().min().unwrap_or(0);
-        let last = corners.iter().copied().max().unwrap_or(0);
-        let mut new_index = vec![NONE; (last - first) as usize + 1];
-        let white = [u16::MAX; 4];
-        if colors.is_some() {
-            part.colors.resize(part.positions.len(), white);
-        }
-        let colored = !part.colors.is_empty() || colors.is_some();
-        if part.positions.len() + new_index.len() >= NONE as usize {
-            return Err("too many vertices of one material; divide the file".to_owned());
-        }
-        part.indices.reserve(corners.len());
-        for corner in corners {
-            let slot = &mut new_index[(corner - first) as usize];
-            if *slot == NONE {
-                *slot = part.positions.len() as u32;
-                let corner = corner as usize;
-                let position = instance.world.transform_point3(positions[corner].into());
-                part.positions.push(position.to_array());
-                if textured {
-                    let uv = texcoords
-                        .as_ref()
-                        .map_or([0.0; 2], |texcoords| made.transform.apply(texcoords[corner]));
-                    let finite = uv.iter().all(|value| value.is_finite());
-                    self.stats.texcoords_not_finite += u64::from(!finite);
-                    part.texcoords.push(if finite { uv } else { [0.0; 2] });
-                }
-                if colored {
-                    part.colors.push(colors.as_ref().map_or(white, |colors| colors[corner]));
-                }
-            }
-            part.indices.push(*slot);
-        }
-        Ok(())
+        let used = compact(&mut corners);
+        let mut texcoord = |vertex: &u32| {
+            let Some(texcoords) = &texcoords else { return [0.0; 2] };
+            let uv = made.transform.apply(texcoords[*vertex as usize]);
+            let is_finite = uv.iter().all(|value| value.is_finite());
+            self.stats.texcoords_not_finite += u64::from(!is_finite);
+            if is_finite { uv } else { [0.0; 2] }
+        };
+        Ok(Some(Decoded {
+            positions: used.iter().map(|vertex| positions[*vertex as usize]).collect(),
+            corners,
+            texcoords: match textured {
+                true => used.iter().map(&mut texcoord).collect(),
+                false => Vec::new(),
+            },
+            colors: colors
+                .map(|colors| used.iter().map(|vertex| colors[*vertex as usize]).collect()),
+        }))
     }
 
     /// Vertex colours, RGB or RGBA, which glTF gives in linear light.
@@ -302,6 +391,49 @@ impl Scene<'_> {
         let opaque = |&[r, g, b]: &[f64; 3]| [r, g, b, 1.0].map(unorm16);
         Ok(colors.iter().map(opaque).collect())
     }
+}
+
+/// Renumbers the vertices that corners use by their first use; returns their old numbers.
+fn compact(corners: &mut [u32]) -> Vec<u32> {
+    let first = corners.iter().copied().min().unwrap_or(0);
+    let last = corners.iter().copied().max().unwrap_or(0);
+    let mut numbers = vec![NONE; (last - first) as usize + 1];
+    let mut used = Vec::new();
+    for corner in corners {
+        let number = &mut numbers[(*corner - first) as usize];
+        if *number == NONE {
+            *number = used.len() as u32;
+            used.push(*corner);
+        }
+        *corner = *number;
+    }
+    used
+}
+
+/// Adds a primitive's triangles and vertices to `part`.
+fn append(part: &mut Part, primitive: &Decoded, world: &DMat4) -> Result<(), String> {
+    let Decoded { positions, corners, texcoords, colors } = primitive;
+    let first = part.positions.len();
+    let vertices = first + positions.len();
+    if vertices >= NONE as usize {
+        return Err("too many vertices of one material; divide the file".to_owned());
+    }
+    let transformed = positions.iter().map(|&position| world.transform_point3(position.into()));
+    part.positions.extend(transformed.map(|position| position.to_array()));
+    part.texcoords.extend_from_slice(texcoords);
+    let white = [u16::MAX; 4];
+    if let Some(colors) = colors {
+        part.colors.resize(first, white);
+        part.colors.extend_from_slice(colors);
+    } else if !part.colors.is_empty() {
+        part.colors.resize(vertices, white);
+    }
+    // A mirrored mesh shows its triangles from behind.
+    let order = if world.determinant() < 0.0 { [0, 2, 1] } else { [0, 1, 2] };
+    for triangle in corners.as_chunks::<3>().0 {
+        part.indices.extend(order.map(|corner| first as u32 + triangle[corner]));
+    }
+    Ok(())
 }
 
 /// Corners in the order of a list of triangles (glTF 2.0, section 3.7.2.1); a rest is dropped.

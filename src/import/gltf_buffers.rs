@@ -9,7 +9,9 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf_json::validation::{Checked, USize64};
 use gltf_json::{Index, Root, buffer};
+use rayon::prelude::*;
 
+use super::gltf_meshopt::{Compressed, Compression};
 use super::paths::Finder;
 
 /// A `.glb` taken apart: its JSON and its binary chunk.
@@ -113,19 +115,25 @@ fn percent_decoded(text: &[u8]) -> Vec<u8> {
 pub(super) struct Buffers<'a> {
     root: &'a Root,
     bytes: Vec<Cow<'a, [u8]>>,
+    /// By buffer view: its bytes, if it was compressed.
+    decoded: Vec<Option<Vec<u8>>>,
 }
 
 impl<'a> Buffers<'a> {
-    /// Reads all buffers; the files among them are added to `dependencies`.
+    /// Reads all buffers and decodes what is compressed; the files among them are added to
+    /// `dependencies`.
     pub(super) fn read(
         root: &'a Root,
+        compression: &Compression,
         binary: Option<&'a [u8]>,
         finder: &mut Finder,
         dependencies: &mut Vec<PathBuf>,
     ) -> Result<Self, String> {
         let mut bytes = Vec::with_capacity(root.buffers.len());
         for (number, buffer) in root.buffers.iter().enumerate() {
+            let is_fallback = compression.is_fallback.get(number) == Some(&true);
             let data: Cow<[u8]> = match (&buffer.uri, binary) {
+                _ if is_fallback => Cow::Borrowed(&[]),
                 (Some(uri), _) => {
                     let (data, file) =
                         read_uri(uri, finder).map_err(|what| format!("buffer {number}: {what}"))?;
@@ -133,10 +141,10 @@ impl<'a> Buffers<'a> {
                     Cow::Owned(data)
                 }
                 (None, Some(binary)) if number == 0 => Cow::Borrowed(binary),
-                // A placeholder of a compression extension; refused where something reads it.
+                // Refused where something reads it.
                 _ => Cow::Borrowed(&[]),
             };
-            let missing = buffer.uri.is_none() && data.is_empty();
+            let missing = is_fallback || (buffer.uri.is_none() && data.is_empty());
             if (data.len() as u64) < buffer.byte_length.0 && !missing {
                 return Err(format!(
                     "buffer {number} is truncated: expected {} bytes, found {}",
@@ -146,12 +154,45 @@ impl<'a> Buffers<'a> {
             }
             bytes.push(data);
         }
-        Ok(Self { root, bytes })
+        let mut buffers = Self { root, bytes, decoded: Vec::new() };
+        buffers.decoded = buffers.decode(&compression.views)?;
+        Ok(buffers)
+    }
+
+    /// Decodes compressed views. None of their bytes may be decoded twice, so that a small file cannot ask for
+    /// more than codecs can make of it.
+    fn decode(&self, views: &[Option<Compressed>]) -> Result<Vec<Option<Vec<u8>>>, String> {
+        let held: usize = self.bytes.iter().map(|bytes| bytes.len()).sum();
+        let lengths = views.iter().flatten().map(|view| view.byte_length);
+        let used = lengths.fold(0, usize::saturating_add);
+        if used > held {
+            return Err(format!(
+                "compressed buffer views have {used} bytes, but all buffers have {held}"
+            ));
+        }
+        let decode = |(number, view): (usize, &Option<Compressed>)| {
+            let Some(view) = view else { return Ok(None) };
+            let bytes = self.bytes.get(view.buffer).and_then(|bytes| {
+                bytes.get(view.byte_offset..view.byte_offset.checked_add(view.byte_length)?)
+            });
+            let decoded = match bytes {
+                Some(bytes) => view.decode(bytes),
+                None => Err(format!(
+                    "{} compressed bytes from {} are not in buffer {}",
+                    view.byte_length, view.byte_offset, view.buffer
+                )),
+            };
+            decoded.map(Some).map_err(|what| format!("buffer view {number}: {what}"))
+        };
+        views.par_iter().enumerate().map(decode).collect()
     }
 
     /// The bytes of a view, its stride not considered.
     pub(super) fn view(&self, index: Index<buffer::View>) -> Result<&[u8], String> {
         let number = index.value();
+        if let Some(Some(decoded)) = self.decoded.get(number) {
+            return Ok(decoded);
+        }
         let view =
             self.root.buffer_views.get(number).ok_or_else(|| no_such("buffer view", number))?;
         let owner = view.buffer.value();
@@ -304,7 +345,9 @@ impl<'a> Buffers<'a> {
             Type::Vec2 => 2,
             Type::Vec3 => 3,
             Type::Vec4 => 4,
-            _ => return Err(format!("accessor {number} holds matrices")),
+            // Columns of 16 bytes, without padding.
+            Type::Mat4 if component_type == ComponentType::F32 => 16,
+            _ => return Err(format!("accessor {number} holds matrices of an unexpected type")),
         };
         if let Some(view) = json.buffer_view
             && view.value() >= self.root.buffer_views.len()

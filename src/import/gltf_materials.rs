@@ -145,12 +145,6 @@ impl<'a> Materials<'a> {
         let image = self.images.get(index).copied().flatten();
         match image.and_then(|image| self.load(image, buffers, finder, warnings)) {
             Some(texture) => result.material.texture = Some(texture),
-            None if image.is_none() => {
-                let name = &result.material.name;
-                let what = format!("{}: material {name}: texture {index} has no image", self.file);
-                warnings.add(what, 1);
-                return;
-            }
             None => return,
         }
         result.texcoord_set = info.tex_coord;

@@ -12,7 +12,9 @@ mod find;
 mod gltf;
 mod gltf_buffers;
 mod gltf_materials;
+mod gltf_meshopt;
 mod gltf_nodes;
+mod gltf_unread;
 mod lines;
 mod mtl;
 mod obj;
@@ -50,6 +52,14 @@ pub fn load_timed(path: &Path, cpu_time: &CpuTime) -> Result<Model> {
         None => {
             Err(Error::input(path, format!("not a model by its extension; {}", find::EXPECTED)))
         }
+    }
+}
+
+/// The copyright notice that a model file states (`asset.copyright` of glTF). Reads its JSON alone.
+pub fn copyright(path: &Path) -> Option<String> {
+    match find::kind(path)? {
+        find::Kind::Obj => None,
+        find::Kind::Gltf => gltf::copyright(path),
     }
 }
 

@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use serde_json::json;
 
 use super::*;
@@ -161,6 +163,239 @@ fn instances_are_groups_and_mirrored_ones_are_turned() {
     }
 }
 
+/// [`square`] in a node with instances: translations, rotations in normalised 16 bits, scales.
+fn instanced() -> (Value, Vec<u8>) {
+    let (mut json, mut binary) = square();
+    binary.truncate(92);
+    for value in [0., 0., 0., 20., 0., 0., 0., 0., 1e6, 1., 1., 1., 2., 3., 1., 1., 1., 1_f32] {
+        binary.extend(value.to_le_bytes());
+    }
+    for value in [0, 0, 0, 32767, 0, 0, 0, 32767, 0, 0, 23170, 23170_i16] {
+        binary.extend(value.to_le_bytes());
+    }
+    json["buffers"][0]["byteLength"] = binary.len().into();
+    let views = json["bufferViews"].as_array_mut().unwrap();
+    views.push(json!({"buffer": 0, "byteOffset": 92, "byteLength": 36}));
+    views.push(json!({"buffer": 0, "byteOffset": 128, "byteLength": 36}));
+    views.push(json!({"buffer": 0, "byteOffset": 164, "byteLength": 24}));
+    let accessors = json["accessors"].as_array_mut().unwrap();
+    for (view, component, shape) in [(3, 5126, "VEC3"), (4, 5126, "VEC3"), (5, 5122, "VEC4")] {
+        accessors.push(json!({"bufferView": view, "componentType": component, "count": 3,
+            "type": shape, "normalized": component == 5122}));
+    }
+    json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"] =
+        json!({"attributes": {"TRANSLATION": 3, "SCALE": 4, "ROTATION": 5, "_ID": 99}});
+    json["nodes"][0]["translation"] = json!([678016.123, 0, 0]);
+    json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
+    json["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    (json, binary)
+}
+
+#[test]
+fn instances_are_placed_by_translation_rotation_and_scale() {
+    let (json, binary) = instanced();
+    let model = read_glb(&json, &binary).unwrap();
+    assert_eq!((model.groups.len(), model.parts.len()), (3, 3));
+    assert!(model.warnings.is_empty());
+    // The corner (1, 1, 0) of each: as it is, scaled by (2, 3, 1), turned by 90 degrees.
+    let expected = [[1.0, 1.0, 0.0], [22.0, 3.0, 0.0], [-1.0, 1.0, 1e6]];
+    for (part, [x, y, z]) in model.parts.iter().zip(expected) {
+        let [found_x, found_y, found_z] = part.positions[2];
+        assert!((found_x - x - 678_016.123).abs() < 1e-9, "{found_x} {x}");
+        assert!((found_y - y).abs() < 1e-9 && found_z == z, "{found_y} {y}, {found_z} {z}");
+        assert_eq!(part.indices, [0, 1, 2, 0, 2, 3]);
+    }
+    assert_eq!(model.parts.iter().map(|part| part.group).collect::<Vec<_>>(), [0, 1, 2]);
+}
+
+#[test]
+fn instances_that_do_not_agree_or_are_too_many_are_refused() {
+    let (json, binary) = instanced();
+    let refused = |edit: &dyn Fn(&mut Value)| {
+        let mut json = json.clone();
+        edit(&mut json);
+        read_glb(&json, &binary).unwrap_err()
+    };
+    let error = refused(&|json| json["accessors"][4]["count"] = 2.into());
+    assert!(
+        error.contains("EXT_mesh_gpu_instancing") && error.contains("found 3 and 2"),
+        "{error}"
+    );
+    let error = refused(&|json| json["accessors"][3]["count"] = (1_u64 << 40).into());
+    assert!(error.contains("triangles are added; expected at most"), "{error}");
+    let error = refused(&|json| json["accessors"][3]["count"] = 4.into());
+    assert!(error.contains("accessor 3: 4 elements"), "{error}");
+    let error = refused(&|json| {
+        json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"] =
+            77.into();
+    });
+    assert!(error.contains("no accessor 77"), "{error}");
+
+    // Many nodes with the same mesh are no better.
+    let (mut json, binary) = square();
+    json["accessors"][2]["count"] = 60_000_000.into();
+    json["scenes"][0]["nodes"] = (0..5).collect();
+    json["nodes"] = (0..5).map(|_| json!({"mesh": 0})).collect();
+    let error = read_glb(&json, &binary).unwrap_err();
+    assert!(error.contains("triangles are added; expected at most"), "{error}");
+}
+
+#[test]
+fn the_center_of_cesium_rtc_moves_everything() {
+    let (mut json, binary) = square();
+    json["nodes"][0]["rotation"] = json!([0, 0, 0.5, 0.5]);
+    json["extensionsUsed"] = json!(["CESIUM_RTC"]);
+    json["extensions"] = json!({"CESIUM_RTC": {"center": [6378137.123456, 100, 200]}});
+    let model = read_glb(&json, &binary).unwrap();
+    assert_eq!(model.parts[0].positions[0], [6_378_137.123_456, 100.0, 200.0]);
+    assert!(model.warnings.is_empty());
+    json["extensions"]["CESIUM_RTC"]["center"] = json!([1, 2]);
+    assert!(read_glb(&json, &binary).unwrap_err().contains("CESIUM_RTC: center"));
+}
+
+#[test]
+fn hidden_nodes_are_left_out_with_those_below() {
+    let (mut json, binary) = square();
+    json["scenes"][0]["nodes"] = json!([0, 1]);
+    json["nodes"] = json!([
+        {"mesh": 0, "name": "shown"},
+        {"mesh": 0, "children": [2], "extensions": {"KHR_node_visibility": {"visible": false}}},
+        {"mesh": 0}
+    ]);
+    let model = read_glb(&json, &binary).unwrap();
+    assert_eq!(model.groups, [Group { name: "shown".into() }]);
+}
+
+#[test]
+fn a_skinned_mesh_is_where_its_first_joint_binds_it() {
+    let (mut json, mut binary) = square();
+    json["scenes"][0]["nodes"] = json!([0, 1]);
+    json["nodes"] = json!([
+        {"mesh": 0, "skin": 0, "translation": [0, 50, 0]},
+        {"translation": [100, 0, 0]}
+    ]);
+    json["skins"] = json!([{"joints": [1]}]);
+    let position = |json: &Value, binary: &[u8]| {
+        let model = read_glb(json, binary).unwrap();
+        let warnings: Vec<_> = model.warnings.iter().collect();
+        assert_eq!(warnings, [("dir/city.glb: primitive with a skin, shown in its bind pose", 1)]);
+        model.parts[0].positions[0]
+    };
+    assert_eq!(position(&json, &binary), [100.0, 0.0, 0.0]);
+    let inverse = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., -100., 7., 0., 1_f32];
+    binary.extend(inverse.iter().flat_map(|value| value.to_le_bytes()));
+    json["buffers"][0]["byteLength"] = binary.len().into();
+    let view = json!({"buffer": 0, "byteOffset": 92, "byteLength": 64});
+    json["bufferViews"].as_array_mut().unwrap().push(view);
+    let accessor = json!({"bufferView": 3, "componentType": 5126, "count": 1, "type": "MAT4"});
+    json["accessors"].as_array_mut().unwrap().push(accessor);
+    json["skins"][0]["inverseBindMatrices"] = 3.into();
+    assert_eq!(position(&json, &binary), [0.0, 7.0, 0.0]);
+}
+
+#[test]
+fn what_changes_the_look_and_is_not_read_is_named_with_its_primitives() {
+    let (json, binary) = square();
+    let warnings = |edit: &dyn Fn(&mut Value)| -> Vec<(String, u64)> {
+        let mut json = json.clone();
+        // Two nodes with a mesh of two primitives, of which the edited material is the first's.
+        let mut other = json["meshes"][0]["primitives"][0].clone();
+        other["material"] = Value::Null;
+        json["meshes"][0]["primitives"].as_array_mut().unwrap().push(other);
+        json["materials"].as_array_mut().unwrap().push(json!({"emissiveFactor": [9, 9, 9]}));
+        json["scenes"][0]["nodes"] = json!([0, 1]);
+        json["nodes"] = json!([{"mesh": 0}, {"mesh": 0}]);
+        edit(&mut json);
+        let model = read_glb(&json, &binary).unwrap();
+        let starts = "dir/city.glb: primitive with ";
+        let of = |(what, count): (&str, u64)| Some((what.strip_prefix(starts)?.to_owned(), count));
+        model.warnings.iter().filter_map(of).collect()
+    };
+    let material = |extension: &'static str| {
+        move |json: &mut Value| {
+            json["materials"][0]["extensions"][extension] = json!({});
+            json["extensionsUsed"] = json!([extension]);
+        }
+    };
+    let cases: [(&str, u64, &dyn Fn(&mut Value)); 12] = [
+        ("extension KHR_materials_transmission", 2, &material("KHR_materials_transmission")),
+        (
+            "extension KHR_materials_emissive_strength",
+            2,
+            &material("KHR_materials_emissive_strength"),
+        ),
+        ("extension ACME_paint", 2, &material("ACME_paint")),
+        ("emissive colour", 2, &|json| json["materials"][0]["emissiveFactor"] = json!([0, 0.5, 0])),
+        ("normal texture", 2, &|json| json["materials"][0]["normalTexture"] = json!({"index": 0})),
+        ("occlusion texture", 2, &|json| {
+            json["materials"][0]["occlusionTexture"] = json!({"index": 0});
+        }),
+        ("morph targets", 2, &|json| {
+            json["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 0}]);
+            json["meshes"][0]["weights"] = json!([0.5]);
+        }),
+        ("morph targets", 1, &|json| {
+            json["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 0}]);
+            json["nodes"][0]["weights"] = json!([0.5]);
+        }),
+        ("animation", 2, &|json| {
+            json["animations"] = json!([{"channels": [{"sampler": 0,
+                "target": {"node": 2, "path": "translation"}}], "samplers": []}]);
+            json["nodes"] = json!([{"mesh": 0}, {"mesh": 0}, {"children": [0]}]);
+            json["scenes"][0]["nodes"] = json!([2, 1]);
+        }),
+        ("extension KHR_lights_punctual", 4, &|json| {
+            json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+            json["extensionsRequired"] = json!(["KHR_lights_punctual"]);
+        }),
+        ("texture in KHR_texture_basisu alone", 2, &|json| {
+            json["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
+            json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+        }),
+        ("texture that has no image", 2, &|json| {
+            json["textures"] = json!([{}]);
+            json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+        }),
+    ];
+    for (expected, count, edit) in cases {
+        let found = warnings(edit);
+        assert_eq!(found.len(), 1, "{found:?} for {expected}");
+        assert!(found[0].0.contains(expected) && found[0].1 == count, "{found:?} for {expected}");
+    }
+
+    let silent: [&dyn Fn(&mut Value); 6] = [
+        &|_| {},
+        &material("KHR_materials_unlit"),
+        &|json| {
+            json["extensionsUsed"] =
+                json!(["EXT_structural_metadata", "KHR_draco_mesh_compression"])
+        },
+        &|json| json["materials"][0]["emissiveFactor"] = json!([0, 0, 0]),
+        &|json| json["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 0}]),
+        &|json| {
+            json["materials"][0]["extensions"]["KHR_materials_unlit"] = json!({});
+            json["materials"][0]["normalTexture"] = json!({"index": 0});
+        },
+    ];
+    for edit in silent {
+        assert_eq!(warnings(edit), []);
+    }
+}
+
+#[test]
+fn required_extensions_that_are_not_read_are_refused_with_a_way_out() {
+    let (mut json, binary) = square();
+    for (extension, expected) in [
+        ("KHR_draco_mesh_compression", "gltf-pipeline"),
+        ("KHR_texture_basisu", "gltf-transform"),
+        ("ACME_geometry", "export it without"),
+    ] {
+        json["extensionsRequired"] = json!([extension]);
+        let error = read_glb(&json, &binary).unwrap_err();
+        assert!(error.contains(extension) && error.contains(expected), "{error}");
+    }
+}
+
 #[test]
 fn strips_and_fans_become_lists() {
     assert_eq!(triangles(vec![0, 1, 2, 3, 4], Mode::TriangleStrip), [0, 1, 2, 1, 3, 2, 2, 3, 4]);
@@ -295,4 +530,210 @@ fn every_truncation_and_bit_flip_gives_a_model_or_an_error() {
             super::super::tests::check(&model);
         }
     }
+}
+
+/// How a compressed view is described: its mode, filter, bytes of an element, elements and data.
+type View<'a> = (&'a str, &'a str, usize, usize, Vec<u8>);
+
+/// [`square`] with the data of its accessors in these compressed views.
+fn compressed(extension: &str, views: [View; 3]) -> (Value, Vec<u8>) {
+    let (mut json, _) = square();
+    let mut binary = vec![0; 3];
+    let mut fallback = 0;
+    json["bufferViews"] = views
+        .into_iter()
+        .map(|(mode, filter, stride, count, bytes)| {
+            let mut view =
+                json!({"buffer": 1, "byteOffset": fallback, "byteLength": stride * count});
+            view["extensions"][extension] = json!({
+                "buffer": 0, "byteOffset": binary.len(), "byteLength": bytes.len(),
+                "byteStride": stride, "count": count, "mode": mode, "filter": filter});
+            fallback += stride * count;
+            binary.extend(bytes);
+            view
+        })
+        .collect();
+    json["buffers"] = json!([{"byteLength": binary.len()},
+        {"byteLength": fallback, "extensions": {extension: {"fallback": true}}}]);
+    json["extensionsRequired"] = json!([extension]);
+    (json, binary)
+}
+
+fn square_positions() -> Vec<[f32; 3]> {
+    vec![[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]]
+}
+
+const CORNERS: [u32; 6] = [0, 1, 2, 0, 2, 3];
+
+/// The three views of a compressed square, by versions of the vertex codec.
+fn compressed_views(version: i32) -> [View<'static>; 3] {
+    let texcoords = [[0_f32; 2]; 4];
+    let level = 2;
+    let encoded = |bytes: meshopt::Result<Vec<u8>>| bytes.unwrap();
+    [
+        (
+            "ATTRIBUTES",
+            "NONE",
+            12,
+            4,
+            encoded(meshopt::encoding::encode_vertex_buffer_level(
+                &square_positions(),
+                level,
+                Some(version),
+            )),
+        ),
+        (
+            "ATTRIBUTES",
+            "NONE",
+            8,
+            4,
+            encoded(meshopt::encoding::encode_vertex_buffer_level(
+                &texcoords,
+                level,
+                Some(version),
+            )),
+        ),
+        ("TRIANGLES", "NONE", 2, 6, encoded(meshopt::encode_index_buffer(&CORNERS, 4))),
+    ]
+}
+
+#[test]
+fn compressed_views_are_read_under_both_names_of_the_extension() {
+    for (extension, version) in [
+        ("EXT_meshopt_compression", 0),
+        ("KHR_meshopt_compression", 0),
+        ("KHR_meshopt_compression", 1),
+    ] {
+        let (json, binary) = compressed(extension, compressed_views(version));
+        let model = read_glb(&json, &binary).unwrap();
+        let part = &model.parts[0];
+        let corners = part.indices.iter().map(|&vertex| part.positions[vertex as usize]);
+        let corners: BTreeSet<_> = corners.map(|position| position.map(f64::to_bits)).collect();
+        let expected = square_positions().into_iter().map(|p| p.map(|c| f64::from(c).to_bits()));
+        assert_eq!(corners, expected.collect());
+        assert_eq!((part.indices.len(), model.warnings.is_empty()), (6, true));
+    }
+}
+
+#[test]
+fn index_sequences_and_filters_are_read() {
+    let [positions, texcoords, _] = compressed_views(0);
+    let filtered = meshopt::encoding::encode_filter_exp::<3>(
+        &square_positions(),
+        20,
+        meshopt::encoding::EncodeExpMode::Separate,
+    );
+    let exponential = meshopt::encode_vertex_buffer(&filtered).unwrap();
+    let sequence = meshopt::encoding::encode_index_sequence(&CORNERS, 4).unwrap();
+    for stride in [2, 4] {
+        let views = [
+            ("ATTRIBUTES", "EXPONENTIAL", 12, 4, exponential.clone()),
+            texcoords.clone(),
+            ("INDICES", "NONE", stride, 6, sequence.clone()),
+        ];
+        let (mut json, binary) = compressed("KHR_meshopt_compression", views);
+        json["accessors"][2]["componentType"] = if stride == 2 { 5123 } else { 5125 }.into();
+        let model = read_glb(&json, &binary).unwrap();
+        assert_eq!(model.parts[0].indices, CORNERS);
+        assert_eq!(model.parts[0].positions[2], [1.0, 1.0, 0.0]);
+    }
+    // Unit vectors, which only normals need, are decoded for whoever reads them.
+    let directions = [[0.6, 0.0, 0.8, 0.0], [0.0, -1.0, 0.0, 0.0_f32]];
+    let octahedral = meshopt::encoding::encode_filter_oct::<i8>(&directions, 8);
+    let bytes = meshopt::encode_vertex_buffer(&octahedral).unwrap();
+    let views =
+        [positions, ("ATTRIBUTES", "OCTAHEDRAL", 4, 2, bytes), compressed_views(0)[2].clone()];
+    let (json, binary) = compressed("EXT_meshopt_compression", views);
+    let compression = Compression::read(&json).unwrap();
+    let view = compression.views[1].as_ref().unwrap();
+    let decoded = view.decode(&binary[view.byte_offset..][..view.byte_length]).unwrap();
+    for (element, expected) in decoded.chunks(4).zip(directions) {
+        let close = |at: usize| (f32::from(element[at] as i8) / 127.0 - expected[at]).abs() < 0.02;
+        assert!((0..3).all(close), "{element:?} {expected:?}");
+    }
+}
+
+#[test]
+fn damaged_and_hostile_compressed_views_are_refused() {
+    let (json, binary) = compressed("EXT_meshopt_compression", compressed_views(0));
+    let refused = |edit: &dyn Fn(&mut Value)| {
+        let mut json = json.clone();
+        edit(&mut json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]);
+        read_glb(&json, &binary).unwrap_err()
+    };
+    let cases: [(&str, &dyn Fn(&mut Value)); 11] = [
+        ("do not fit", &|view| view["count"] = 1_000_000.into()),
+        ("do not fit", &|view| view["count"] = u64::MAX.into()),
+        ("not in buffer 0", &|view| view["byteOffset"] = u64::MAX.into()),
+        ("all buffers have", &|view| view["byteLength"] = u64::MAX.into()),
+        ("not in buffer 7", &|view| view["buffer"] = 7.into()),
+        ("Attributes of 4 elements of 7 bytes", &|view| view["byteStride"] = 7.into()),
+        ("Attributes of 4 elements of 0 bytes", &|view| view["byteStride"] = 0.into()),
+        ("Quaternion", &|view| view["filter"] = "QUATERNION".into()),
+        ("unknown variant", &|view| view["mode"] = "MESHLETS".into()),
+        ("missing field `count`", &|view| _ = view.as_object_mut().unwrap().remove("count")),
+        ("Triangles of 4 elements", &|view| {
+            view["mode"] = "TRIANGLES".into();
+            view["byteStride"] = 4.into();
+        }),
+    ];
+    for (expected, edit) in cases {
+        let error = refused(edit);
+        assert!(error.contains("buffer view") && error.contains(expected), "{error}: {expected}");
+    }
+    // The same bytes cannot be decoded again and again.
+    let mut repeated = json.clone();
+    let view = repeated["bufferViews"][0].clone();
+    repeated["bufferViews"].as_array_mut().unwrap().extend(vec![view; 1000]);
+    assert!(read_glb(&repeated, &binary).unwrap_err().contains("all buffers have"));
+
+    // The container pads to four bytes.
+    for length in 0..binary.len() - 4 {
+        assert!(read_glb(&json, &binary[..length]).is_err());
+    }
+    for bit in 0..binary.len() * 8 {
+        let mut flipped = binary.clone();
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        if let Ok(model) = read_glb(&json, &flipped).map(super::super::assemble) {
+            model.iter().for_each(super::super::tests::check);
+        }
+    }
+}
+
+#[test]
+fn quantised_positions_are_read_normalised_or_not_in_8_and_16_bits() {
+    for (component, size, most) in
+        [(5120, 1, 127), (5121, 1, 255), (5122, 2, 32767), (5123, 2, 65535_i32)]
+    {
+        for normalized in [false, true] {
+            let (mut json, mut binary) = square();
+            binary.truncate(92);
+            for position in square_positions() {
+                let value = |c: f32| ((c as i32) * most).to_le_bytes()[..size].to_vec();
+                binary.extend(position.into_iter().flat_map(value));
+                binary.resize(binary.len().next_multiple_of(4), 0);
+            }
+            let stride = (3 * size).next_multiple_of(4);
+            json["buffers"][0]["byteLength"] = binary.len().into();
+            let view = json!({"buffer": 0, "byteOffset": 92, "byteLength": 4 * stride,
+                "byteStride": stride});
+            json["bufferViews"].as_array_mut().unwrap().push(view);
+            json["accessors"][0] = json!({"bufferView": 3, "componentType": component, "count": 4,
+                "normalized": normalized, "type": "VEC3"});
+            json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+            let model = read_glb(&json, &binary).unwrap();
+            let side = if normalized { 1.0 } else { f64::from(most) };
+            assert_eq!(model.parts[0].positions[2], [side, side, 0.0], "{component} {normalized}");
+        }
+    }
+}
+
+#[test]
+fn skirts_of_nodes_are_left_out() {
+    let (mut json, binary) = square();
+    json["meshes"][0]["primitives"][0]["extras"] = json!({"skirt_triangles": 1});
+    let model = read_glb(&json, &binary).unwrap();
+    assert_eq!(model.parts[0].indices, [0, 1, 2]);
+    json["meshes"][0]["primitives"][0]["extras"] = json!({"skirt_triangles": u64::MAX});
+    assert!(read_glb(&json, &binary).unwrap_err().contains("no triangle in any mesh"));
 }
