@@ -132,6 +132,7 @@ impl<'a> BlockSetup<'a> {
             origin: place.origin,
             up: self.up,
             encoding: Encoding { step, compress: options.compress },
+            copyright: options.copyright.as_deref(),
             textured_weight: options.textured_weight,
             stages,
             progress,

@@ -3,6 +3,7 @@
 //! - [`pipeline`]: the whole build; [`mod@prepare`]: an input as it is built; [`block`]: to the trees of its blocks
 //! - [`sources`]: what is read as one input: files, and tiles of large ones
 //! - [`subset`] and [`merge`]: shares of a build for several machines, and one result of all of them
+//! - [`copyright`]: notices of the inputs, which every node repeats
 //! - [`districts`]: nodes above the blocks, made from these nodes' files
 //! - [`blocks`]: what a block is: groups merged, divided and gathered
 //! - [`stitch`]: borders of the source that touch without sharing vertices
@@ -21,6 +22,7 @@ pub mod blocks;
 pub mod border;
 mod checkpoint;
 pub mod constants;
+pub mod copyright;
 pub mod cut;
 pub mod districts;
 pub mod emit;

@@ -4,6 +4,7 @@ use crate::builder::blocks::plan::BlockMode;
 use crate::builder::hierarchy::HierarchyOptions;
 use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::bytes::Bytes;
+use crate::format::COPYRIGHT;
 use crate::import::tiling::TILE_VERTICES;
 use crate::lattice::{Quantization, STEPS};
 use crate::mesh::UpAxis;
@@ -22,6 +23,9 @@ pub struct BuildOptions {
     pub up: Option<UpAxis>,
     /// Where the city stands on the Earth.
     pub placement: Placement,
+    /// Copyright notice of the result, for nodes and tileset. A build adds the notices of its inputs; see
+    /// [`copyright`](crate::builder::copyright).
+    pub copyright: Option<String>,
     /// JPEG quality of leaves, 1–100; coarse levels are a quarter as far from 100.
     pub jpeg_quality: u8,
     /// Longest side of an atlas in texels, 16–65535.
@@ -53,6 +57,7 @@ impl Default for BuildOptions {
             blocks: BlockMode::Auto,
             up: None,
             placement: Placement::Local,
+            copyright: None,
             jpeg_quality: 85,
             max_atlas: 4096,
             quantize: None,
@@ -125,6 +130,9 @@ impl BuildOptions {
         if self.max_memory.is_some() {
             parameters[TILES] = TILE_VERTICES.into();
         }
+        if let Some(copyright) = &self.copyright {
+            parameters[COPYRIGHT] = copyright.as_str().into();
+        }
         if self.placement != Placement::Local {
             parameters[PLACEMENT] = serde_json::json!(self.placement);
         }
@@ -155,6 +163,7 @@ impl BuildOptions {
             blocks: blocks.parse().map_err(|what| unknown("blocks", &what))?,
             up: read(parameters, "up")?,
             placement: placement_of(parameters)?,
+            copyright: parameters.get(COPYRIGHT).and_then(|text| text.as_str()).map(str::to_owned),
             jpeg_quality: read(parameters, "jpeg_quality")?,
             max_atlas: read(parameters, "max_atlas")?,
             quantize: Quantization::of(parameters).map(|quantization| quantization.step),
@@ -221,6 +230,7 @@ mod tests {
             blocks: BlockMode::Grid(12.5),
             up: Some(UpAxis::Y),
             placement: Placement::Crs { epsg: 25832, height_offset: 46.5 },
+            copyright: Some("© 2024 City; © Survey".into()),
             jpeg_quality: 71,
             max_atlas: 777,
             quantize: Some(0.01),

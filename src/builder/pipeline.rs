@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use crate::builder::block::{BuiltBlock, build_input};
 use crate::builder::block_setup::Target;
 use crate::builder::checkpoint::Checkpoints;
+use crate::builder::copyright;
 use crate::builder::districts::{Above, Districts, build_districts};
 use crate::builder::emit::disk_sink::{NodeRecord, check_unique};
 use crate::builder::emit::forest::{append_nodes, make_errors_monotone, set_block};
@@ -123,6 +124,8 @@ fn run(
     options.check()?;
     let globe = options.placement.globe()?;
     let files = import::find_inputs(arguments)?;
+    let copyright = copyright::joined(&files, options.copyright.as_deref());
+    let options = &BuildOptions { copyright, ..options.clone() };
     // A folder that was given counts as a whole: what is built into it would be an input the next
     // time.
     check_apart(out, arguments.iter().chain(&files))?;

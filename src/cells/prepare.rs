@@ -226,7 +226,8 @@ fn cell(
         let [i, j, k] = place;
         let file = format!("c{i}_{j}_{k}-{direction}-{kind}.glb");
         let label = NodeLabel { id: direction, level: 0 };
-        let bytes = write_glb_encoded(&made.mesh, session.scene().up, label, FORM)?;
+        let scene = session.scene();
+        let bytes = write_glb_encoded(&made.mesh, scene.up, label, FORM, scene.copyright())?;
         write_beside(&out.join(CELLS_DIR).join(&file), &bytes)?;
         let primitives = &made.mesh.primitives;
         faces.push(Face {

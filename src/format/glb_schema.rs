@@ -65,6 +65,9 @@ pub(super) struct Root {
 pub(super) struct Asset {
     pub version: String,
     pub generator: String,
+    /// Copyright notices of the inputs, separated by `; `; viewers show them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub copyright: Option<String>,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -57,7 +57,7 @@ const QUARTERS: Encoding = Encoding { step: Some(0.25), compress: false };
 fn file_in_quarters(up: UpAxis) -> Vec<u8> {
     let mut mesh = mesh_in_quarters();
     QUARTERS.prepare(&mut mesh);
-    write_glb_encoded(&mesh, up, LABEL, QUARTERS).unwrap()
+    write_glb_encoded(&mesh, up, LABEL, QUARTERS, None).unwrap()
 }
 
 fn json_of(bytes: &[u8]) -> serde_json::Value {
@@ -74,7 +74,7 @@ fn encodings_lose_nothing_that_was_prepared() {
             let encoding = Encoding { step, compress };
             let mut mesh = if step.is_some() { mesh_in_quarters() } else { mesh() };
             encoding.prepare(&mut mesh);
-            let bytes = write_glb_encoded(&mesh, up, LABEL, encoding).unwrap();
+            let bytes = write_glb_encoded(&mesh, up, LABEL, encoding, None).unwrap();
             let mut back = read(&bytes).unwrap();
             for (found, expected) in back.primitives.iter_mut().zip(&mesh.primitives) {
                 let turned = |indices: &[u32]| -> Vec<[u32; 3]> {
@@ -156,7 +156,7 @@ fn what_does_not_fit_in_steps_keeps_32_bits() {
         let before = mesh.clone();
         QUARTERS.prepare(&mut mesh);
         assert_eq!(mesh.origin, before.origin);
-        let bytes = write_glb_encoded(&mesh, UpAxis::Z, LABEL, QUARTERS).unwrap();
+        let bytes = write_glb_encoded(&mesh, UpAxis::Z, LABEL, QUARTERS, None).unwrap();
         assert!(!json_of(&bytes)["extensionsUsed"].to_string().contains("KHR_mesh_quantization"));
         assert_eq!(read(&bytes).unwrap(), mesh);
     }
@@ -203,7 +203,7 @@ fn damaged_compressed_files_do_no_harm() {
     let encoding = Encoding { step: None, compress: true };
     let mut mesh = mesh();
     encoding.prepare(&mut mesh);
-    let bytes = write_glb_encoded(&mesh, UpAxis::Z, LABEL, encoding).unwrap();
+    let bytes = write_glb_encoded(&mesh, UpAxis::Z, LABEL, encoding, None).unwrap();
     for place in 0..bytes.len() {
         for wrong in [0, 0x7F, 0xFF] {
             let mut damaged = bytes.clone();

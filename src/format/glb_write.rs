@@ -30,16 +30,17 @@ pub struct NodeLabel {
 /// Fails where the mesh breaks its own promises: arrays of different lengths, indices out of
 /// range, numbers that are not finite, an origin that does not fit in f32.
 pub fn write_glb(mesh: &NodeMesh, up: UpAxis, label: NodeLabel) -> Result<Vec<u8>> {
-    write_glb_encoded(mesh, up, label, Encoding::default())
+    write_glb_encoded(mesh, up, label, Encoding::default(), None)
 }
 
-/// [`write_glb`] in another encoding. Compression loses nothing, but may turn triangles, so that
+/// [`write_glb`] in another encoding, with a copyright notice. Compression loses nothing, but may turn triangles, so that
 /// another corner is first.
 pub fn write_glb_encoded(
     mesh: &NodeMesh,
     up: UpAxis,
     label: NodeLabel,
     encoding: Encoding,
+    copyright: Option<&str>,
 ) -> Result<Vec<u8>> {
     // One transform for all primitives: all are in steps or none is.
     let steps = encoding.step.filter(|&step| is_in_steps(mesh, step));
@@ -52,6 +53,7 @@ pub fn write_glb_encoded(
             asset: Asset {
                 version: "2.0".into(),
                 generator: concat!("hlod ", env!("CARGO_PKG_VERSION")).into(),
+                copyright: copyright.map(str::to_owned),
             },
             extensions_used: Vec::new(),
             extensions_required: Vec::new(),

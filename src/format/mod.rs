@@ -54,7 +54,7 @@ pub(crate) use output_dir::resolve;
 pub use output_dir::{OutputDir, Unfinished, check_apart};
 pub use quantized::fits_in_steps;
 pub(crate) use regular_file::{open_regular, read_regular};
-pub use scene::{BlockInfo, Children, Node, Scene, SharedTexture};
+pub use scene::{BlockInfo, COPYRIGHT, Children, Node, Scene, SharedTexture};
 pub use scene_check::{Element, SceneDefect};
 
 /// The 3D Tiles tileset that a viewer opens, inside an output folder.

@@ -111,7 +111,15 @@ pub struct Node {
     pub shared_textures: Vec<u32>,
 }
 
+/// The build parameter that holds the copyright notice of all inputs.
+pub const COPYRIGHT: &str = "copyright";
+
 impl Scene {
+    /// The copyright notice of all inputs.
+    pub fn copyright(&self) -> Option<&str> {
+        self.parameters.get(COPYRIGHT)?.as_str()
+    }
+
     /// Indices of the nodes without a parent, in order.
     pub fn roots(&self) -> impl Iterator<Item = u32> {
         self.nodes.iter().zip(0..).filter(|(node, _)| node.parent.is_none()).map(|(_, index)| index)

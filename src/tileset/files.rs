@@ -8,8 +8,7 @@ use super::VERSION;
 use super::placed::place;
 use super::regions::root;
 use super::tile::Tile;
-use crate::format::Scene;
-use crate::format::{TILESET_FILE, TILESETS_DIR};
+use crate::format::{COPYRIGHT, Scene, TILESET_FILE, TILESETS_DIR};
 use crate::lattice::Quantization;
 use crate::place::Placement;
 use crate::{Error, Result};
@@ -49,6 +48,13 @@ pub(super) fn files_of(
         "up": scene.up,
         "parameters": scene.parameters,
     });
+    if let Some(copyright) = scene.copyright() {
+        extras[COPYRIGHT] = json!(copyright);
+        // CesiumJS shows these; those of glTF only while a node is drawn.
+        let credits: Vec<Value> =
+            copyright.split("; ").map(|notice| json!({ "html": escaped(notice) })).collect();
+        extras["cesium"] = json!({ "credits": credits });
+    }
     if let Some(quantization) = Quantization::of(&scene.parameters) {
         extras["quantized"] =
             json!({ "step_metres": quantization.step, "bound_metres": quantization.bound() });
@@ -72,6 +78,11 @@ pub(super) fn files_of(
     let whole = writer.document(tile.json, extras)?;
     files.insert(0, TilesetFile { path: TILESET_FILE.into(), bytes: whole });
     Ok(files)
+}
+
+/// Text as HTML.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// Two digits are enough of a bound, and no more are known of one that was sampled.

@@ -4,6 +4,7 @@ use std::fs;
 
 use hlod::city::{self, CityOptions, TextureSize};
 
+use crate::gltf_inputs::check_nodes_as_inputs;
 use crate::support::inputs::small_city;
 use crate::support::run_build;
 
@@ -32,6 +33,7 @@ fn every_encoding_is_verified_against_the_source_and_smaller_than_plain() {
             run_build(folder.path(), &[&options.concat()[..], &["city.obj", &out]].concat());
             let verify = ["verify", &out, "--source", "city.obj", "--samples", "20000"];
             run_build(folder.path(), &verify);
+            check_nodes_as_inputs(&folder.path().join(&out));
             let nodes = fs::read_dir(folder.path().join(&out).join("nodes")).unwrap();
             sizes.push(nodes.map(|node| node.unwrap().metadata().unwrap().len()).sum::<u64>());
         }

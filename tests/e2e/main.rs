@@ -11,6 +11,7 @@ mod crash;
 mod determinism;
 mod districts;
 mod encodings;
+mod gltf_inputs;
 mod golden;
 mod groups;
 mod houses;

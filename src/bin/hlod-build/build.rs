@@ -98,6 +98,10 @@ pub struct BuildArgs {
     #[arg(long, value_name = "TEXELS", default_value_t = 4096, help_heading = "Textures")]
     max_atlas: u32,
 
+    /// Copyright notice to write into every node and the tileset, behind those of glTF inputs
+    /// (asset.copyright), which are kept in any case
+    #[arg(long, value_name = "TEXT", help_heading = "Files")]
+    copyright: Option<String>,
     /// Round all positions to multiples of one step and store them in 16 bits
     /// (KHR_mesh_quantization). The step is the largest power of two not above METRES (0.000001 to
     /// 1000): 1/128 m for 0.01. Leaves are then within half a step of the source along each axis;
@@ -228,6 +232,7 @@ impl BuildArgs {
                 UpArg::Z => UpAxis::Z,
             }),
             placement: self.placement(),
+            copyright: self.copyright.clone(),
             jpeg_quality: self.jpeg_quality,
             max_atlas: self.max_atlas,
             quantize: self.quantize,

@@ -74,6 +74,8 @@ pub struct DiskSink<'a> {
     pub up: UpAxis,
     /// How geometry is stored.
     pub encoding: Encoding,
+    /// The copyright notice of all inputs.
+    pub copyright: Option<&'a str>,
     /// `c_textured`.
     pub textured_weight: f64,
     /// Where the time goes.
@@ -115,7 +117,7 @@ impl NodeSink for DiskSink<'_> {
         self.stages.time(Stage::Write, || {
             let label = NodeLabel { id, level: node.level() as u32 };
             self.encoding.prepare(&mut mesh);
-            let bytes = write_glb_encoded(&mesh, self.up, label, self.encoding)?;
+            let bytes = write_glb_encoded(&mesh, self.up, label, self.encoding, self.copyright)?;
             self.out.write(format!("{NODES_DIR}/{file}"), &bytes)?;
             let attributes = attributes(&mesh, self.textured_weight);
             let pictures = mesh
