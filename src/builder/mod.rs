@@ -44,7 +44,6 @@ pub mod stitch;
 pub mod subset;
 pub mod threads;
 pub mod tiles;
-pub mod up;
 
 pub use options::BuildOptions;
 pub use pipeline::{Outcome, build, build_subset, merge_subsets};

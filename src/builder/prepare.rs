@@ -7,7 +7,7 @@ use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
 use crate::cpu_time::CpuTime;
 use crate::lattice::{Lattice, Quantization};
-use crate::mesh::{Model, UpAxis};
+use crate::mesh::{Model, UpAxis, UpEvidence};
 use crate::place::{Globe, z_up};
 use crate::report::build_report::UpFrom;
 use crate::{Error, Result};
@@ -56,8 +56,12 @@ impl Preparing<'_> {
             // Degrees beside metres have no shape.
             (None, None) if options.placement.is_degrees() => (UpAxis::Z, UpFrom::Degrees),
             (None, None) => {
-                let known = sources.up_of(input);
-                (known.unwrap_or_else(|| crate::builder::up::guess(&model)), UpFrom::Shape)
+                let up = sources.up_of(input).unwrap_or_else(|| {
+                    let guess = stages.time(Stage::Import, || UpEvidence::of(&model).guess());
+                    guess.warn(&mut model.warnings);
+                    guess.axis
+                });
+                (up, UpFrom::Shape)
             }
         };
         options.placement.localise(&mut model, up)?;

@@ -8,7 +8,6 @@ use crate::builder::inputs::unchanged;
 use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
 use crate::builder::reuse::Earlier;
-use crate::builder::up::of_box;
 use crate::cpu_time::CpuTime;
 use crate::import::tiling::{TILE_VERTICES, Tiling, is_divided};
 use crate::mesh::{Model, UpAxis};
@@ -21,7 +20,7 @@ use crate::{Result, import};
 /// those of files: they lie below that of the file that they are of, as if it were a folder.
 #[derive(Debug, Default)]
 pub struct Sources {
-    tilings: Vec<(Tiling, UpAxis)>,
+    tilings: Vec<Tiling>,
     /// By path: the tiling, and which of its tiles.
     tiles: BTreeMap<PathBuf, (usize, usize)>,
     /// Files that were looked at for changes: several tiles are of the same.
@@ -55,10 +54,8 @@ impl Sources {
             }
             progress.dividing(&input);
             let bounds = import::bounds(&input)?;
-            let up = options.up.unwrap_or_else(|| match options.placement.is_degrees() {
-                true => UpAxis::Z,
-                false => of_box(bounds),
-            });
+            let degrees = options.placement.is_degrees().then_some(UpAxis::Z);
+            let up = options.up.or(degrees);
             let tiling = Tiling::of(&input, bounds, up, TILE_VERTICES, dir, cpu_time)?;
             let stem = input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             for tile in 0..tiling.tiles() {
@@ -66,7 +63,7 @@ impl Sources {
                 sources.tiles.insert(path.clone(), (sources.tilings.len(), tile));
                 all.push(path);
             }
-            sources.tilings.push((tiling, up));
+            sources.tilings.push(tiling);
         }
         Ok((sources, all))
     }
@@ -90,7 +87,7 @@ impl Sources {
     pub fn load(&self, input: &Path, cpu_time: &CpuTime) -> Result<Model> {
         match self.tiles.get(input) {
             Some(&(tiling, tile)) => {
-                let mut model = self.tilings[tiling].0.load(tile, cpu_time)?;
+                let mut model = self.tilings[tiling].load(tile, cpu_time)?;
                 model.source = input.to_path_buf();
                 Ok(model)
             }
@@ -100,18 +97,18 @@ impl Sources {
 
     /// The up axis of an input by the shape of all that it is a tile of; `None` where it is none.
     pub fn up_of(&self, input: &Path) -> Option<UpAxis> {
-        self.tiles.get(input).map(|&(tiling, _)| self.tilings[tiling].1)
+        self.tiles.get(input).map(|&(tiling, _)| self.tilings[tiling].up())
     }
 
     /// Least and greatest coordinates of an input's vertices, where they are known without reading it.
     pub fn bounds(&self, input: &Path) -> Option<[[f64; 3]; 2]> {
-        self.tiles.get(input).map(|&(tiling, tile)| self.tilings[tiling].0.bounds(tile))
+        self.tiles.get(input).map(|&(tiling, tile)| self.tilings[tiling].bounds(tile))
     }
 
     /// Bytes of the text of an input.
     pub fn bytes(&self, input: &Path) -> u64 {
         match self.tiles.get(input) {
-            Some(&(tiling, tile)) => self.tilings[tiling].0.bytes(tile),
+            Some(&(tiling, tile)) => self.tilings[tiling].bytes(tile),
             None => std::fs::metadata(input).map_or(0, |facts| facts.len()),
         }
     }

@@ -10,6 +10,7 @@ mod outline;
 mod polygon;
 mod surface;
 mod triangle_mesh;
+mod up_evidence;
 
 pub use coordinate::{Coordinate, Key, PositionKey, color_key, key, texcoord_key, wide};
 pub(crate) use disjoint_set::DisjointSet;
@@ -21,3 +22,4 @@ pub(crate) use polygon::Triangulator;
 pub(crate) use surface::Surface;
 pub use triangle_mesh::Mesh;
 pub(crate) use triangle_mesh::all_differ;
+pub use up_evidence::{UpEvidence, UpGuess};

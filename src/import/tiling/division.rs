@@ -44,14 +44,6 @@ impl Counts {
         *count = count.saturating_add(1);
     }
 
-    /// Those of both, of the same ground.
-    pub fn joined(mut self, other: Self) -> Self {
-        for (count, more) in self.counts.iter_mut().zip(&other.counts) {
-            *count = count.saturating_add(*more);
-        }
-        self
-    }
-
     /// Vertices of each line of cells across an axis, of a rectangle of cells.
     fn across(&self, axis: usize, [columns, rows]: &[std::ops::Range<usize>; 2]) -> Vec<u64> {
         let along = [columns, rows][axis];
@@ -78,6 +70,7 @@ enum Place {
 }
 
 /// The ground halved where about as much is on either side, the halves likewise, and so on.
+#[derive(Default)]
 pub(super) struct Division {
     places: Vec<Place>,
     /// How many tiles there are.

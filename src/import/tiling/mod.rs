@@ -23,7 +23,6 @@ use self::bodies::Bodies;
 use self::division::{Counts, Division};
 use self::spilled::Spilled;
 use self::tile_text::{Belongs, FaceCorner, Names, TileReader, TileText};
-use super::bounds::fold_vertices;
 use super::clean::CleanStats;
 use super::find::{Kind, kind};
 use super::obj::chunks::Chunks;
@@ -32,7 +31,7 @@ use super::obj::statements::{Change, MOST_VERTICES, Statements, WHITE};
 use super::obj::{BYTE_ORDER_MARK, Batch, CHUNK_BYTES, Parsed, load_part, text_of};
 use crate::bytes::Bytes;
 use crate::cpu_time::CpuTime;
-use crate::mesh::{Model, Triangulator, UpAxis, Warnings};
+use crate::mesh::{Model, Triangulator, UpAxis, UpEvidence, UpGuess, Warnings};
 use crate::{Error, Result};
 
 /// Vertices of a tile, at most: about 200,000 triangles, which take 15 MB as text and as much again in memory
@@ -62,6 +61,7 @@ pub struct Tiling {
     source: PathBuf,
     file: Arc<File>,
     tiles: Vec<TileText>,
+    up: UpAxis,
     warnings: Warnings,
 }
 
@@ -86,39 +86,38 @@ pub fn is_divided(path: &Path) -> bool {
 }
 
 impl Tiling {
-    /// Divides the OBJ at `path`, of [`bounds`](super::bounds) and with this up axis, into tiles of `vertices` at
-    /// most, with files in `dir` while it lasts.
+    /// Divides the OBJ at `path`, of [`bounds`](super::bounds), into tiles of `vertices` at most, with files in
+    /// `dir` while it lasts. Where `up` is `None` its shape says which axis is up.
     pub fn of(
         path: &Path,
         bounds: [[f64; 3]; 2],
-        up: UpAxis,
+        up: Option<UpAxis>,
         vertices: u64,
         dir: &Path,
         cpu_time: &CpuTime,
     ) -> Result<Self> {
         check_space(path, dir)?;
-        let counts = || Counts::new(bounds, up);
-        let add = |mut counts: Counts, vertex| {
-            counts.add(vertex);
-            counts
-        };
-        let counts = fold_vertices(path, counts, add, Counts::joined)?;
-        let division = Division::of(&counts, vertices);
         let unwritable = |error: io::Error| {
             Error::output(dir, format!("tiles of {} cannot be written: {error}", path.display()))
         };
-        let mut tiler = Tiler::new(path, dir, division).map_err(unwritable)?;
+        let evidence = up.is_none().then(|| UpEvidence::new(bounds));
+        let mut tiler = Tiler::new(path, dir, evidence).map_err(unwritable)?;
         let fault = |fault| match fault {
             Fault::Text(what) => Error::input(path, what),
             Fault::Disk(error) => unwritable(error),
         };
         each_chunk(path, cpu_time, |chunk| tiler.join(chunk).map_err(fault))?;
+        let shape = tiler.evidence.take().map(|evidence| evidence.guess());
+        let up = up.map(UpGuess::known).or(shape).unwrap_or(UpGuess::known(UpAxis::Z));
+        up.warn(&mut tiler.warnings);
+        let up = up.axis;
+        tiler.divide(bounds, up, vertices).map_err(unwritable)?;
         let axes = ground(up);
         let side = axes.map(|axis| bounds[1][axis] - bounds[0][axis]);
         let width = (side[0] * side[1] / tiler.division.tiles as f64).sqrt() * SMALL;
         tiler.settle(axes, width, (vertices / FEW) as u32).map_err(unwritable)?;
         each_chunk(path, cpu_time, |chunk| tiler.add(chunk).map_err(fault))?;
-        let tiling = tiler.finish().map_err(unwritable)?;
+        let tiling = tiler.finish(up).map_err(unwritable)?;
         match tiling.tiles.is_empty() {
             true if !tiling.warnings.is_empty() => {
                 let what = format!("no face is left: {}", super::listed(&tiling.warnings));
@@ -127,6 +126,11 @@ impl Tiling {
             true => Err(Error::input(path, "no face; expected at least one")),
             false => Ok(tiling),
         }
+    }
+
+    /// The axis that points at the sky.
+    pub fn up(&self) -> UpAxis {
+        self.up
     }
 
     /// How many tiles there are.
@@ -223,6 +227,8 @@ impl From<io::Error> for Fault {
 /// The state of dividing a file.
 struct Tiler<'a> {
     path: &'a Path,
+    /// Which axis is up, where that is to be found out.
+    evidence: Option<UpEvidence>,
     division: Division,
     file: File,
     end: u64,
@@ -241,20 +247,20 @@ struct Tiler<'a> {
     triangulator: Triangulator,
     stats: CleanStats,
     index_faults: IndexFaults,
+    warnings: Warnings,
     lines: u64,
 }
 
 impl<'a> Tiler<'a> {
-    fn new(path: &'a Path, dir: &Path, division: Division) -> io::Result<Self> {
-        let tiles: Vec<TileText> =
-            std::iter::repeat_with(TileText::default).take(division.tiles).collect();
+    fn new(path: &'a Path, dir: &Path, evidence: Option<UpEvidence>) -> io::Result<Self> {
         Ok(Self {
             path,
+            evidence,
+            division: Division::default(),
             file: tempfile::tempfile_in(dir)?,
             end: 0,
-            pending: PENDING.min(MOST_PENDING / tiles.len()),
-            tiles,
-            division,
+            tiles: Vec::new(),
+            pending: PENDING,
             positions: Spilled::new(dir)?,
             placed: 0,
             bodies: Bodies::default(),
@@ -265,6 +271,7 @@ impl<'a> Tiler<'a> {
             triangulator: Triangulator::default(),
             stats: CleanStats::default(),
             index_faults: IndexFaults::default(),
+            warnings: Warnings::default(),
             lines: 0,
         })
     }
@@ -277,6 +284,35 @@ impl<'a> Tiler<'a> {
         self.positions.extend(std::mem::take(&mut chunk.positions))?;
         self.bodies.grow(self.positions.len());
         self.bodies.join_faces(&chunk, before);
+        if let Some(evidence) = &mut self.evidence {
+            let mut first = 0;
+            let mut outline = Vec::new();
+            for &count in &chunk.faces {
+                outline.clear();
+                for [position, _] in &chunk.corners[first..first + count as usize] {
+                    let position = position.resolve(before).map_or(usize::MAX, |at| at as usize);
+                    outline.extend(self.positions.get(position)?);
+                }
+                evidence.add(&outline);
+                first += count as usize;
+            }
+        }
+        Ok(())
+    }
+
+    /// Once all vertices are known: where the ground is divided into tiles of so many.
+    fn divide(&mut self, bounds: [[f64; 3]; 2], up: UpAxis, vertices: u64) -> io::Result<()> {
+        let mut counts = Counts::new(bounds, up);
+        for index in 0..self.positions.len() {
+            if let Some(position) = self.positions.get(index)?
+                && position.iter().all(|coordinate| coordinate.is_finite())
+            {
+                counts.add(position);
+            }
+        }
+        self.division = Division::of(&counts, vertices);
+        self.tiles.resize_with(self.division.tiles, TileText::default);
+        self.pending = PENDING.min(MOST_PENDING / self.division.tiles);
         Ok(())
     }
 
@@ -389,16 +425,17 @@ impl<'a> Tiler<'a> {
         }
     }
 
-    fn finish(mut self) -> io::Result<Tiling> {
+    fn finish(mut self, up: UpAxis) -> io::Result<Tiling> {
         for tile in &mut self.tiles {
             tile.flush(&self.names, &self.file, &mut self.end)?;
         }
-        let mut warnings = Warnings::default();
+        let mut warnings = self.warnings;
         self.index_faults.report(self.path, &mut warnings);
         self.stats.report(self.path, &mut warnings);
         let mut tiles = self.tiles;
         tiles.retain(|tile| !tile.pieces.is_empty());
-        Ok(Tiling { source: self.path.to_path_buf(), file: Arc::new(self.file), tiles, warnings })
+        let source = self.path.to_path_buf();
+        Ok(Tiling { source, file: Arc::new(self.file), tiles, up, warnings })
     }
 }
 

@@ -48,7 +48,7 @@ fn hills(side: usize) -> String {
 fn tiled(path: &Path, vertices: u64) -> Result<Tiling> {
     let dir = path.parent().unwrap();
     let bounds = super::super::bounds(path).unwrap();
-    Tiling::of(path, bounds, UpAxis::Z, vertices, dir, &CpuTime::default())
+    Tiling::of(path, bounds, Some(UpAxis::Z), vertices, dir, &CpuTime::default())
 }
 
 /// Area on the ground by names of group and material.
