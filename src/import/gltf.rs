@@ -351,7 +351,7 @@ impl Scene<'_> {
         let mut corners = triangles(corners, mode);
         // Nodes of this crate's own results end with skirts, which are no surface.
         let skirts = primitive.extras.as_ref().and_then(|extras| {
-            serde_json::from_str::<Value>(extras.get()).ok()?["skirt_triangles"].as_u64()
+            serde_json::from_str::<Value>(extras.get()).ok()?["skirtTriangles"].as_u64()
         });
         let skirts = usize::try_from(skirts.unwrap_or(0)).unwrap_or(usize::MAX);
         corners.truncate(corners.len().saturating_sub(skirts.saturating_mul(3)));

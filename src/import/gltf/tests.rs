@@ -731,9 +731,9 @@ fn quantised_positions_are_read_normalised_or_not_in_8_and_16_bits() {
 #[test]
 fn skirts_of_nodes_are_left_out() {
     let (mut json, binary) = square();
-    json["meshes"][0]["primitives"][0]["extras"] = json!({"skirt_triangles": 1});
+    json["meshes"][0]["primitives"][0]["extras"] = json!({"skirtTriangles": 1});
     let model = read_glb(&json, &binary).unwrap();
     assert_eq!(model.parts[0].indices, [0, 1, 2]);
-    json["meshes"][0]["primitives"][0]["extras"] = json!({"skirt_triangles": u64::MAX});
+    json["meshes"][0]["primitives"][0]["extras"] = json!({"skirtTriangles": u64::MAX});
     assert!(read_glb(&json, &binary).unwrap_err().contains("no triangle in any mesh"));
 }
