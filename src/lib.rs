@@ -12,7 +12,6 @@ pub mod camera;
 pub mod cells;
 pub mod city;
 pub mod color;
-pub mod cpu_time;
 pub mod decode;
 pub mod engine;
 pub mod error;
@@ -27,6 +26,9 @@ pub mod random;
 pub mod render;
 pub mod report;
 pub mod runtime;
+#[cfg(test)]
+mod scaling;
+pub mod stage_timer;
 pub mod texture;
 pub mod tileset;
 pub mod verify;

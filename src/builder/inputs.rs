@@ -8,6 +8,7 @@ use crate::Result;
 use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
 use crate::report::build_report::{FileReport, InputReport};
+use crate::stage_timer::StageTimer;
 
 /// Sizes and hashes of the files of an input.
 pub fn describe(
@@ -21,12 +22,13 @@ pub fn describe(
 
 /// True where every file of an input is as it was.
 pub fn unchanged(earlier: &InputReport, sources: &Sources) -> bool {
-    !earlier.files.is_empty()
-        && earlier.files.par_iter().all(|file| {
-            let path = Path::new(&file.path);
-            let size = std::fs::metadata(path).map_or(0, |facts| facts.len());
-            size == file.bytes && sources.report(path).is_ok_and(|now| now == *file)
-        })
+    let timer = StageTimer::current();
+    let is_same = |file: &FileReport| {
+        let path = Path::new(&file.path);
+        let size = std::fs::metadata(path).map_or(0, |facts| facts.len());
+        size == file.bytes && sources.report(path).is_ok_and(|now| now == *file)
+    };
+    !earlier.files.is_empty() && earlier.files.par_iter().all(|file| timer.time(|| is_same(file)))
 }
 
 /// A path as text, for reports.

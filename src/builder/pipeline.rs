@@ -29,7 +29,6 @@ use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
 use crate::builder::subset::Subset;
 use crate::builder::tiles::border::InputBorder;
-use crate::cpu_time::CpuTime;
 use crate::format::{
     BlockInfo, Node, OutputDir, REPORT_FILE, SCENE_FILE, SUBSETS_DIR, Scene, SharedTexture,
     Unfinished, check_apart, fits_in_steps,
@@ -139,11 +138,10 @@ fn run(
     let known = || open(&target).or_else(|| open(out));
     let stopped = || unfinished.as_ref().and_then(|unfinished| open(unfinished.path()));
     let earlier = if options.force { None } else { stopped().or_else(known) };
-    let cpu_time = CpuTime::default();
     let folder = existing_folder(&target);
-    let (sources, all_inputs) =
-        Sources::divide(files, options, earlier.as_ref(), &folder, &cpu_time, progress)?;
-    stages.add(Stage::Import, cpu_time.total());
+    let (sources, all_inputs) = stages.time(Stage::Import, || {
+        Sources::divide(files, options, earlier.as_ref(), &folder, progress)
+    })?;
     let inputs = match subset {
         Some(subset) => subset.pick(&all_inputs, &sources)?,
         None => all_inputs.clone(),

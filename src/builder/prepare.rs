@@ -5,7 +5,6 @@ use std::path::Path;
 use crate::builder::options::BuildOptions;
 use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
-use crate::cpu_time::CpuTime;
 use crate::lattice::{Lattice, Quantization};
 use crate::mesh::{Model, UpAxis, UpEvidence};
 use crate::place::{Globe, z_up};
@@ -45,10 +44,7 @@ impl Preparing<'_> {
     /// Reads an input.
     pub fn read(&self, input: &Path) -> Result<Prepared> {
         let &Self { options, sources, globe, stages, inputs } = self;
-        let cpu_time = CpuTime::default();
-        let model = sources.load(input, &cpu_time);
-        stages.add(Stage::Import, cpu_time.total());
-        let mut model = model?;
+        let mut model = stages.time(Stage::Import, || sources.load(input))?;
         let triangles = model.triangle_count() as u64;
         let (up, up_from) = match (options.up, model.up) {
             (Some(up), _) => (up, UpFrom::Option),

@@ -1,6 +1,6 @@
 //! What is read as one input: a file, or a tile of one that is too large to be read whole.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -8,7 +8,6 @@ use crate::builder::inputs::unchanged;
 use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
 use crate::builder::reuse::Earlier;
-use crate::cpu_time::CpuTime;
 use crate::import::tiling::{TILE_VERTICES, Tiling, is_divided};
 use crate::mesh::{Model, UpAxis};
 use crate::report::build_report::{FileReport, InputReport};
@@ -36,7 +35,6 @@ impl Sources {
         options: &BuildOptions,
         earlier: Option<&Earlier>,
         dir: &Path,
-        cpu_time: &CpuTime,
         progress: &dyn Progress,
     ) -> Result<(Self, Vec<PathBuf>)> {
         let mut sources = Self::default();
@@ -56,7 +54,7 @@ impl Sources {
             let bounds = import::bounds(&input)?;
             let degrees = options.placement.is_degrees().then_some(UpAxis::Z);
             let up = options.up.or(degrees);
-            let tiling = Tiling::of(&input, bounds, up, TILE_VERTICES, dir, cpu_time)?;
+            let tiling = Tiling::of(&input, bounds, up, TILE_VERTICES, dir)?;
             let stem = input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             for tile in 0..tiling.tiles() {
                 let path = input.join(format!("{stem}-{tile:04}"));
@@ -71,27 +69,26 @@ impl Sources {
     /// What an earlier result was built from, where that is all of `inputs` and none of them has changed.
     fn unchanged(&self, inputs: &[PathBuf], earlier: &Earlier) -> Option<Vec<PathBuf>> {
         let known = &earlier.report.inputs;
-        let is_of = |known: &InputReport, input: &PathBuf| {
-            let path = Path::new(&known.path);
-            path == input || path.parent() == Some(input)
-        };
         let is_whole = earlier.report.subset.is_none() && earlier.tileset;
-        let all_known = inputs.iter().all(|input| known.iter().any(|known| is_of(known, input)));
-        let all_there = known.iter().all(|known| inputs.iter().any(|input| is_of(known, input)));
+        let known_paths: BTreeSet<&Path> = known.iter().flat_map(paths).collect();
+        let all_known = inputs.iter().all(|input| known_paths.contains(input.as_path()));
+        let input_paths: BTreeSet<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+        let all_there =
+            known.iter().all(|known| paths(known).any(|path| input_paths.contains(path)));
         let is_same = || known.iter().all(|known| unchanged(known, self));
         let same = is_whole && all_known && all_there && is_same();
         same.then(|| known.iter().map(|known| PathBuf::from(&known.path)).collect())
     }
 
-    /// Reads an input, and adds the time that it takes to `cpu_time`.
-    pub fn load(&self, input: &Path, cpu_time: &CpuTime) -> Result<Model> {
+    /// Reads an input.
+    pub fn load(&self, input: &Path) -> Result<Model> {
         match self.tiles.get(input) {
             Some(&(tiling, tile)) => {
-                let mut model = self.tilings[tiling].load(tile, cpu_time)?;
+                let mut model = self.tilings[tiling].load(tile)?;
                 model.source = input.to_path_buf();
                 Ok(model)
             }
-            None => import::load_timed(input, cpu_time),
+            None => import::load(input),
         }
     }
 
@@ -125,4 +122,10 @@ impl Sources {
         }
         Ok(report)
     }
+}
+
+/// The path of an input, and that of the file which it may be a tile of.
+fn paths(known: &InputReport) -> impl Iterator<Item = &Path> {
+    let path = Path::new(&known.path);
+    [Some(path), path.parent()].into_iter().flatten()
 }

@@ -1,8 +1,6 @@
-//! Where the time goes, summed over threads.
+//! Processor time of each stage, summed over threads.
 
-use std::time::Duration;
-
-use crate::cpu_time::CpuTime;
+use crate::stage_timer::StageTimer;
 
 /// A stage of the build, in the order in which a triangle meets them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,22 +59,18 @@ impl Stage {
     }
 }
 
-/// Adds up the time of each stage.
+/// Sums the processor time of each stage.
 #[derive(Debug, Default)]
-pub struct Stages([CpuTime; Stage::ALL.len()]);
+pub struct Stages([StageTimer; Stage::ALL.len()]);
 
 impl Stages {
-    /// Runs `work`, which must not hand work to other threads, and counts its time.
+    /// Runs `work` and counts the processor time that it takes on this thread, less that of stages
+    /// within it. Work for other threads is counted as [`StageTimer::current`] says.
     pub fn time<T>(&self, stage: Stage, work: impl FnOnce() -> T) -> T {
         self.0[stage as usize].time(work)
     }
 
-    /// Counts time that was measured elsewhere.
-    pub fn add(&self, stage: Stage, time: Duration) {
-        self.0[stage as usize].add(time);
-    }
-
-    /// Seconds of a stage so far.
+    /// Processor seconds of a stage so far.
     pub fn seconds(&self, stage: Stage) -> f64 {
         self.0[stage as usize].total().as_secs_f64()
     }

@@ -35,20 +35,14 @@ pub use find::find_inputs;
 
 use glam::DVec3;
 
-use crate::cpu_time::CpuTime;
-use crate::mesh::{Model, Part, Warnings};
+use crate::mesh::{Material, Model, Part, Warnings};
 use crate::{Error, Result};
 
 /// Reads one model file: OBJ, glTF or GLB, by its extension.
 pub fn load(path: &Path) -> Result<Model> {
-    load_timed(path, &CpuTime::default())
-}
-
-/// Reads one model file, and adds the time that the threads at work need for it to `cpu_time`.
-pub fn load_timed(path: &Path, cpu_time: &CpuTime) -> Result<Model> {
     match find::kind(path) {
-        Some(find::Kind::Obj) => obj::load(path, cpu_time),
-        Some(find::Kind::Gltf) => cpu_time.time(|| gltf::load(path)),
+        Some(find::Kind::Obj) => obj::load(path),
+        Some(find::Kind::Gltf) => gltf::load(path),
         None => {
             Err(Error::input(path, format!("not a model by its extension; {}", find::EXPECTED)))
         }

@@ -36,8 +36,8 @@ use super::paged::Paged;
 use super::paths::Finder;
 use super::textures::Textures;
 use super::vertices::{Numbered, Unifier};
-use crate::cpu_time::CpuTime;
 use crate::mesh::{Group, Model, Part, Warnings};
+use crate::stage_timer::StageTimer;
 use crate::{Error, Result};
 
 /// How much is looked at to tell text from other files.
@@ -50,26 +50,17 @@ pub(super) const CHUNK_BYTES: usize = 1 << 18;
 const CHUNKS_PER_THREAD: usize = 4;
 
 /// Reads the OBJ at `path` with its material libraries.
-pub(super) fn load(path: &Path, cpu_time: &CpuTime) -> Result<Model> {
-    read(path, super::open(path)?, CHUNK_BYTES, cpu_time)
+pub(super) fn load(path: &Path) -> Result<Model> {
+    read(path, super::open(path)?, CHUNK_BYTES)
 }
 
 /// Reads a part of the OBJ at `path`, whose text `reader` has.
-pub(super) fn load_part(
-    path: &Path,
-    reader: impl Read + Send,
-    cpu_time: &CpuTime,
-) -> Result<Model> {
-    read(path, reader, CHUNK_BYTES, cpu_time)
+pub(super) fn load_part(path: &Path, reader: impl Read + Send) -> Result<Model> {
+    read(path, reader, CHUNK_BYTES)
 }
 
 /// Reads an OBJ from `reader`; what it names is looked for beside `path`.
-fn read(
-    path: &Path,
-    mut reader: impl Read + Send,
-    chunk_bytes: usize,
-    cpu_time: &CpuTime,
-) -> Result<Model> {
+fn read(path: &Path, mut reader: impl Read + Send, chunk_bytes: usize) -> Result<Model> {
     let unreadable = |error| Error::input(path, format!("cannot be read: {error}"));
     let mut head = text_of(path, &mut reader)?;
     if head.starts_with(BYTE_ORDER_MARK) {
@@ -77,15 +68,18 @@ fn read(
     }
     let mut chunks = Chunks::new(head, reader, chunk_bytes);
     let mut obj = Obj::new(path);
-    let mut batch = Batch::parse(&mut chunks, cpu_time);
+    let timer = StageTimer::current();
+    let mut batch = Batch::parse(&mut chunks);
     loop {
         let Batch { parsed, ended } = batch;
         if parsed.is_empty() {
             ended.map_err(unreadable)?;
-            return obj.finish(cpu_time);
+            return obj.finish();
         }
-        let (added, next) =
-            rayon::join(|| obj.add(parsed, cpu_time), || Batch::parse(&mut chunks, cpu_time));
+        let (added, next) = rayon::join(
+            || timer.time(|| obj.add(parsed)),
+            || timer.time(|| Batch::parse(&mut chunks)),
+        );
         added.map_err(|what| Error::input(path, what))?;
         batch = next;
         if batch.parsed.is_empty() && ended.is_err() {
@@ -126,9 +120,9 @@ pub(super) struct Batch {
 }
 
 impl Batch {
-    pub(super) fn parse(chunks: &mut Chunks<impl Read>, cpu_time: &CpuTime) -> Self {
+    pub(super) fn parse(chunks: &mut Chunks<impl Read>) -> Self {
         let mut texts = Vec::new();
-        let ended = cpu_time.time(|| {
+        let mut read = || {
             while texts.len() < CHUNKS_PER_THREAD * rayon::current_num_threads() {
                 match chunks.next()? {
                     Some(text) => texts.push(text),
@@ -136,9 +130,11 @@ impl Batch {
                 }
             }
             Ok(())
-        });
+        };
+        let ended = read();
+        let timer = StageTimer::current();
         let parse =
-            |text: Vec<u8>| cpu_time.time(|| Parsed { statements: Statements::of(&text), text });
+            |text: Vec<u8>| timer.time(|| Parsed { statements: Statements::of(&text), text });
         Self { parsed: texts.into_par_iter().map(parse).collect(), ended }
     }
 }
@@ -233,7 +229,7 @@ impl<'a> Obj<'a> {
     }
 
     /// Adds the chunks that come next.
-    fn add(&mut self, mut parsed: Vec<Parsed>, cpu_time: &CpuTime) -> Result<(), String> {
+    fn add(&mut self, mut parsed: Vec<Parsed>) -> Result<(), String> {
         let mut before = [self.positions.len(), self.texcoords.len()];
         let chunk_starts: Vec<[usize; 2]> = parsed
             .iter()
@@ -243,23 +239,22 @@ impl<'a> Obj<'a> {
                 std::mem::replace(&mut before, next)
             })
             .collect();
+        let timer = StageTimer::current();
         parsed.par_iter_mut().zip(chunk_starts).for_each(|(chunk, before)| {
-            cpu_time.time(|| chunk.statements.settle(&chunk.text, before));
+            timer.time(|| chunk.statements.settle(&chunk.text, before));
         });
-        let placed: Vec<Placed> = cpu_time
-            .time(|| parsed.into_iter().map(|chunk| self.place(chunk)).collect::<Result<_, _>>())?;
+        let placed: Vec<Placed> =
+            parsed.into_iter().map(|chunk| self.place(chunk)).collect::<Result<_, _>>()?;
         let positions = &self.positions;
         let triangles: Vec<Triangles> = placed
             .par_iter()
             .map(|Placed { statements, runs, before }| {
-                cpu_time.time(|| Triangles::of(statements, runs, *before, positions))
+                timer.time(|| Triangles::of(statements, runs, *before, positions))
             })
             .collect();
         drop(placed);
-        cpu_time.time(|| {
-            self.unifier.grow(self.positions.len());
-            triangles.into_iter().try_for_each(|chunk| self.join(chunk))
-        })
+        self.unifier.grow(self.positions.len());
+        triangles.into_iter().try_for_each(|chunk| self.join(chunk))
     }
 
     /// Settles what a chunk's indices mean and to which parts its faces belong.
@@ -496,7 +491,7 @@ impl<'a> Obj<'a> {
         }
     }
 
-    fn finish(mut self, cpu_time: &CpuTime) -> Result<Model> {
+    fn finish(mut self) -> Result<Model> {
         let line_count = self.lines;
         self.index_faults.report(self.path, &mut self.warnings);
         if self.parts.is_empty() {
@@ -517,14 +512,15 @@ impl<'a> Obj<'a> {
         self.resolve_materials();
         self.stats.unused_vertices = self.unifier.unused(self.positions.len());
         let vertices = std::mem::take(&mut self.unifier).numbered(self.parts.len());
+        let timer = StageTimer::current();
         self.parts.par_iter_mut().for_each(|state| {
             let number = |index: &mut u32| *index = vertices.number(*index);
-            cpu_time.time(|| state.part.indices.iter_mut().for_each(number));
+            timer.time(|| state.part.indices.iter_mut().for_each(number));
         });
-        cpu_time.time(|| self.fill_parts(vertices));
+        self.fill_parts(vertices);
         let parts: Vec<(Part, CleanStats)> = std::mem::take(&mut self.parts)
             .into_par_iter()
-            .map(|state| cpu_time.time(|| finished(state)))
+            .map(|state| timer.time(|| finished(state)))
             .collect();
         let mut kept = Vec::with_capacity(parts.len());
         for (part, stats) in parts {

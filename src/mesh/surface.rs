@@ -15,6 +15,8 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::builder::build_bvh2;
 use rayon::prelude::*;
 
+use crate::stage_timer::StageTimer;
+
 /// Share of the extent by which a distance to a box may be wrong in f32: that of the point and
 /// that of the box's corner, along three axes.
 const BOX_SLACK: f64 = 4.0 / (1 << 23) as f64;
@@ -99,7 +101,8 @@ impl Surface {
         for members in squares.into_values() {
             divide(members, &positions, &triangles, most, &mut parts);
         }
-        let part = |members| Part::new(&positions, &triangles, members);
+        let timer = StageTimer::current();
+        let part = |members| timer.time(|| Part::new(&positions, &triangles, members));
         let parts = parts.into_par_iter().map(part).collect();
         Self { positions, triangles, parts }
     }

@@ -253,7 +253,8 @@ impl SharedTexturesReport {
 pub struct StageReport {
     /// Its name.
     pub stage: String,
-    /// Seconds of work, summed over the threads that did it.
+    /// Processor seconds, summed over the threads that worked on it; wall seconds of each thread
+    /// where the system has no clock of a thread's processor time.
     pub seconds: f64,
 }
 

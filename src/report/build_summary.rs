@@ -107,7 +107,7 @@ fn summary(report: &BuildReport, out: &Path, rate: &str) -> String {
         .map(|stage| format!("{} {:.2}", stage.stage, stage.seconds))
         .collect();
     if !stages.is_empty() {
-        let _ = writeln!(text, "  seconds of work: {}", stages.join(", "));
+        let _ = writeln!(text, "  processor seconds: {}", stages.join(", "));
     }
     for warning in report.warnings.iter().take(SHOWN_WARNINGS) {
         let _ = writeln!(text, "  warning: {} ({} times)", warning.text, warning.count);

@@ -16,6 +16,7 @@ use super::raster::{self, Rasterizer};
 use super::shared::SharedTextures;
 use crate::decode::DecodedTexture;
 use crate::mesh::{Mesh, Model};
+use crate::stage_timer::StageTimer;
 
 /// What of the texture work can be chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,30 +135,30 @@ impl<'a> BlockTextures<'a> {
         let used = plan.textures_of(used);
 
         let usage = Usage::find(mesh, &material_textures, plan.texture_count());
-        let prepared: Vec<(u32, Prepared, u64)> = used
-            .into_par_iter()
-            .map(|texture| {
-                let Some(decoded) = cache.take(texture) else {
-                    return (texture, Prepared::Absent, 0);
-                };
-                let whole = plan.texture_use(texture) == TextureUse::Repeating;
-                let found = if whole { None } else { usage.region(texture, &decoded.image, mesh) };
-                let Some(Found { region, wraps, used_texels }) = found else {
-                    return (texture, Prepared::Repeating(decoded), 0);
-                };
-                // Where no other block waits for the image, it becomes this one's own.
-                let image = Arc::try_unwrap(decoded)
-                    .map_or_else(|shared| Arc::clone(&shared.image), |own| own.image);
-                let source = AtlasSource {
-                    size: [f64::from(image.width), f64::from(image.height)],
-                    origin: region.origin.map(|start| start as f64),
-                    wraps,
-                    channels: usize::from(image.channels),
-                    levels: level::level_images(image, &region, &steps),
-                };
-                (texture, Prepared::Atlas(source), used_texels)
-            })
-            .collect();
+        let prepare = |texture: u32| {
+            let Some(decoded) = cache.take(texture) else {
+                return (texture, Prepared::Absent, 0);
+            };
+            let whole = plan.texture_use(texture) == TextureUse::Repeating;
+            let found = if whole { None } else { usage.region(texture, &decoded.image, mesh) };
+            let Some(Found { region, wraps, used_texels }) = found else {
+                return (texture, Prepared::Repeating(decoded), 0);
+            };
+            // Where no other block waits for the image, it becomes this one's own.
+            let image = Arc::try_unwrap(decoded)
+                .map_or_else(|shared| Arc::clone(&shared.image), |own| own.image);
+            let source = AtlasSource {
+                size: [f64::from(image.width), f64::from(image.height)],
+                origin: region.origin.map(|start| start as f64),
+                wraps,
+                channels: usize::from(image.channels),
+                levels: level::level_images(image, &region, &steps),
+            };
+            (texture, Prepared::Atlas(source), used_texels)
+        };
+        let timer = StageTimer::current();
+        let prepared: Vec<(u32, Prepared, u64)> =
+            used.into_par_iter().map(|texture| timer.time(|| prepare(texture))).collect();
 
         let mut textures = Vec::new();
         textures.resize_with(plan.texture_count(), || Prepared::Absent);

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHasher};
 
 use crate::mesh::{Part, PositionKey, all_differ, key, wide};
+use crate::stage_timer::StageTimer;
 
 /// An edge that one triangle of a model has, by position.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +36,8 @@ impl OpenEdge {
 
 /// The open edges of some parts taken together, ordered by position.
 pub fn open_edges(parts: &[Part]) -> Vec<OpenEdge> {
-    let rests: Vec<Rests> = parts.par_iter().map(rests).collect();
+    let timer = StageTimer::current();
+    let rests: Vec<Rests> = parts.par_iter().map(|part| timer.time(|| rests(part))).collect();
     // What is open in one part may be closed by others.
     let mut sums = Rests::default();
     for (&position, rest) in rests.iter().flatten() {
@@ -44,25 +46,36 @@ pub fn open_edges(parts: &[Part]) -> Vec<OpenEdge> {
     }
     sums.retain(|_, sum| *sum != 0);
     drop(rests);
-    let edges_of = |(part, of): (usize, &Part)| edges_at(part as u32, of, &sums);
+    let edges_of = |(number, part): (usize, &Part)| {
+        timer.time(|| {
+            let mut edges = edges_at(number as u32, part, &sums);
+            edges.sort_unstable();
+            edges
+        })
+    };
     let found: Vec<Vec<Candidate>> = parts.par_iter().enumerate().map(edges_of).collect();
     let mut candidates: Vec<Candidate> = Vec::with_capacity(found.iter().map(Vec::len).sum());
     found.into_iter().for_each(|mut of_part| candidates.append(&mut of_part));
-    candidates.par_sort_unstable();
-    let mut open = Vec::new();
+    // Stable, since that merges the parts' runs, which are in order.
+    candidates.sort();
+    let mut open: Vec<OpenEdge> = Vec::new();
     for of_hash in candidates.chunk_by(|a, b| a.hash == b.hash) {
-        let edge = |candidate: &Candidate| candidate.edge(parts);
-        let alone = |candidate: &&Candidate| {
-            let own = edge(candidate).ends;
-            let is_same = |other: &OpenEdge| own.iter().all(|end| other.ends.contains(end));
-            of_hash.iter().filter(|other| is_same(&edge(other))).count() == 1
-        };
-        match of_hash {
-            [only] => open.push(edge(only)),
-            _ => open.extend(of_hash.iter().filter(alone).map(edge)),
+        let edges = of_hash.iter().map(|candidate| candidate.edge(parts));
+        if of_hash.len() == 1 {
+            open.extend(edges);
+            continue;
         }
+        // Different edges may have one hash.
+        let undirected = |edge: OpenEdge| {
+            let [a, b] = edge.ends.map(key);
+            ([a.min(b), a.max(b)], edge)
+        };
+        let mut edges: Vec<_> = edges.map(undirected).collect();
+        edges.sort_by_key(|(ends, _)| *ends);
+        let alone = edges.chunk_by(|(a, _), (b, _)| a == b).filter(|same| same.len() == 1);
+        open.extend(alone.flatten().map(|(_, edge)| *edge));
     }
-    open.par_sort_unstable_by_key(|edge| edge.ends.map(key));
+    open.sort_unstable_by_key(|edge| edge.ends.map(key));
     open
 }
 

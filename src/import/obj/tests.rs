@@ -27,7 +27,7 @@ fn read_from(folder: &tempfile::TempDir, obj: impl AsRef<[u8]>) -> Result<Model>
 }
 
 fn read_in_chunks(folder: &tempfile::TempDir, obj: &[u8], chunk_bytes: usize) -> Result<Model> {
-    super::read(&folder.path().join("city.obj"), obj, chunk_bytes, &CpuTime::default())
+    super::read(&folder.path().join("city.obj"), obj, chunk_bytes)
 }
 
 /// The model or the error must be the same wherever the text is divided.

@@ -30,8 +30,8 @@ use super::obj::index_faults::IndexFaults;
 use super::obj::statements::{Change, MOST_VERTICES, Statements, WHITE};
 use super::obj::{BYTE_ORDER_MARK, Batch, CHUNK_BYTES, Parsed, load_part, text_of};
 use crate::bytes::Bytes;
-use crate::cpu_time::CpuTime;
 use crate::mesh::{Model, Triangulator, UpAxis, UpEvidence, UpGuess, Warnings};
+use crate::stage_timer::StageTimer;
 use crate::{Error, Result};
 
 /// Vertices of a tile, at most: about 200,000 triangles, which take 15 MB as text and as much again in memory
@@ -94,7 +94,6 @@ impl Tiling {
         up: Option<UpAxis>,
         vertices: u64,
         dir: &Path,
-        cpu_time: &CpuTime,
     ) -> Result<Self> {
         check_space(path, dir)?;
         let unwritable = |error: io::Error| {
@@ -106,7 +105,7 @@ impl Tiling {
             Fault::Text(what) => Error::input(path, what),
             Fault::Disk(error) => unwritable(error),
         };
-        each_chunk(path, cpu_time, |chunk| tiler.join(chunk).map_err(fault))?;
+        each_chunk(path, |chunk| tiler.join(chunk).map_err(fault))?;
         let shape = tiler.evidence.take().map(|evidence| evidence.guess());
         let up = up.map(UpGuess::known).or(shape).unwrap_or(UpGuess::known(UpAxis::Z));
         up.warn(&mut tiler.warnings);
@@ -116,7 +115,7 @@ impl Tiling {
         let side = axes.map(|axis| bounds[1][axis] - bounds[0][axis]);
         let width = (side[0] * side[1] / tiler.division.tiles as f64).sqrt() * SMALL;
         tiler.settle(axes, width, (vertices / FEW) as u32).map_err(unwritable)?;
-        each_chunk(path, cpu_time, |chunk| tiler.add(chunk).map_err(fault))?;
+        each_chunk(path, |chunk| tiler.add(chunk).map_err(fault))?;
         let tiling = tiler.finish(up).map_err(unwritable)?;
         match tiling.tiles.is_empty() {
             true if !tiling.warnings.is_empty() => {
@@ -149,10 +148,10 @@ impl Tiling {
     }
 
     /// Reads a tile. What was imperfect in all of the file is told with the first.
-    pub fn load(&self, tile: usize, cpu_time: &CpuTime) -> Result<Model> {
+    pub fn load(&self, tile: usize) -> Result<Model> {
         let pieces = self.tiles[tile].pieces.iter();
         let reader = TileReader { file: Arc::clone(&self.file), pieces, piece: (0, 0) };
-        let mut model = load_part(&self.source, reader, cpu_time)?;
+        let mut model = load_part(&self.source, reader)?;
         if tile == 0 {
             model.warnings.extend(self.warnings.clone());
         }
@@ -161,26 +160,23 @@ impl Tiling {
 }
 
 /// Goes through a file, chunk by chunk.
-fn each_chunk(
-    path: &Path,
-    cpu_time: &CpuTime,
-    mut add: impl FnMut(Parsed) -> Result<()> + Send,
-) -> Result<()> {
+fn each_chunk(path: &Path, mut add: impl FnMut(Parsed) -> Result<()> + Send) -> Result<()> {
     let mut reader = super::open(path)?;
     let mut head = text_of(path, &mut reader)?;
     if head.starts_with(BYTE_ORDER_MARK) {
         head.drain(..BYTE_ORDER_MARK.len());
     }
     let mut chunks = Chunks::new(head, reader, CHUNK_BYTES);
-    let mut batch = Batch::parse(&mut chunks, cpu_time);
+    let timer = StageTimer::current();
+    let mut batch = Batch::parse(&mut chunks);
     loop {
         let Batch { parsed, ended } = batch;
         if parsed.is_empty() {
             return ended.map_err(|error| Error::input(path, format!("cannot be read: {error}")));
         }
         let (added, next) = rayon::join(
-            || parsed.into_iter().try_for_each(&mut add),
-            || Batch::parse(&mut chunks, cpu_time),
+            || timer.time(|| parsed.into_iter().try_for_each(&mut add)),
+            || timer.time(|| Batch::parse(&mut chunks)),
         );
         added?;
         batch = next;

@@ -48,7 +48,7 @@ fn hills(side: usize) -> String {
 fn tiled(path: &Path, vertices: u64) -> Result<Tiling> {
     let dir = path.parent().unwrap();
     let bounds = super::super::bounds(path).unwrap();
-    Tiling::of(path, bounds, Some(UpAxis::Z), vertices, dir, &CpuTime::default())
+    Tiling::of(path, bounds, Some(UpAxis::Z), vertices, dir)
 }
 
 /// Area on the ground by names of group and material.
@@ -78,7 +78,7 @@ fn tiles_have_all_of_a_file_and_nothing_twice() {
         assert!(tiling.tiles() >= 3720 / vertices as usize, "{}", tiling.tiles());
         let mut found = BTreeMap::new();
         for tile in 0..tiling.tiles() {
-            let model = tiling.load(tile, &CpuTime::default()).unwrap();
+            let model = tiling.load(tile).unwrap();
             assert_eq!(model.bounds(), tiling.bounds(tile));
             assert_eq!(model.dependencies, whole.dependencies);
             assert_eq!(model.parts[0].colors.is_empty(), whole.parts[0].colors.is_empty());
@@ -101,7 +101,7 @@ fn a_single_tile_is_the_file() {
         fs::write(&path, text).unwrap();
         let (whole, tiling) = (super::super::load(&path).unwrap(), tiled(&path, 1 << 20).unwrap());
         assert_eq!(tiling.tiles(), 1);
-        let tile = tiling.load(0, &CpuTime::default()).unwrap();
+        let tile = tiling.load(0).unwrap();
         assert!(whole.triangle_count() > faces);
         assert_eq!((&tile.parts, &tile.groups), (&whole.parts, &whole.groups));
         assert_eq!(
@@ -120,7 +120,7 @@ fn neighbours_have_their_border_in_common() {
     // How many edges go from one place to another less those back: a border of the hills, not of tiles.
     let mut edges: BTreeMap<[[u64; 3]; 2], i32> = BTreeMap::new();
     for tile in 0..tiling.tiles() {
-        for part in tiling.load(tile, &CpuTime::default()).unwrap().parts {
+        for part in tiling.load(tile).unwrap().parts {
             for corners in part.indices.as_chunks::<3>().0 {
                 for side in 0..3 {
                     let ends = [corners[side], corners[(side + 1) % 3]]
@@ -174,7 +174,7 @@ fn small_bodies_stay_whole_in_the_tile_of_their_middle() {
     assert!(tiling.tiles() >= 8, "{}", tiling.tiles());
     let mut triangles: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for tile in 0..tiling.tiles() {
-        let model = tiling.load(tile, &CpuTime::default()).unwrap();
+        let model = tiling.load(tile).unwrap();
         assert!(model.triangle_count() < 2500, "{}", model.triangle_count());
         for part in &model.parts {
             let of = triangles.entry(model.groups[part.group as usize].name.clone());
@@ -191,10 +191,7 @@ fn what_is_wrong_is_told_as_of_the_whole_file() {
     let path = folder.path().join("wrong.obj");
     let said = |text: &str| {
         fs::write(&path, text).unwrap();
-        tiled(&path, 2)
-            .and_then(|tiling| tiling.load(0, &CpuTime::default()))
-            .unwrap_err()
-            .to_string()
+        tiled(&path, 2).and_then(|tiling| tiling.load(0)).unwrap_err().to_string()
     };
     let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
     assert!(
@@ -216,7 +213,7 @@ fn what_is_imperfect_is_counted_once() {
         model.warnings.iter().filter(|(text, _)| text.contains(what)).map(|(_, times)| times).sum()
     };
     let tiling = tiled(&path, 100).unwrap();
-    let load = |tile| tiling.load(tile, &CpuTime::default()).unwrap();
+    let load = |tile| tiling.load(tile).unwrap();
     for what in [
         "not finite, dropped",
         "free-form element",
