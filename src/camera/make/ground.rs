@@ -1,6 +1,7 @@
 //! What a scene looks like to someone who stands in it: where the ground is and where one can go.
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use glam::{DVec2, DVec3};
 
@@ -62,8 +63,8 @@ pub struct Ground {
     pub(super) height: Vec<f32>,
     /// Metres to the middle of the nearest obstacle; 0 within one.
     pub(super) clearance: Vec<f32>,
-    /// How much one sees.
-    pub(super) sight: Sight,
+    /// Found when it is first asked for, since flights ask for none of it.
+    sight: OnceLock<Sight>,
 }
 
 impl Ground {
@@ -114,15 +115,22 @@ impl Ground {
         let blocked: Vec<bool> =
             surfaces.high.iter().zip(&height).map(|(high, ground)| high - ground > step).collect();
         let clearance = clearance(&surfaces.cells, &blocked);
-        let eye = |cell: usize| f64::from(height[cell]) + EYE_HEIGHT_M * scale;
-        let sight = Sight::new(&surfaces, scale, |cell| clearance[cell] > 0.0, eye);
         let density = density(&surfaces, scale);
         let focus = match &overview {
             Some(overview) => densest(overview, &self::density(overview, scale), |_| true),
             None => densest(&surfaces, &density, |_| true),
         };
         let focus = focus.unwrap_or_default();
+        let sight = OnceLock::new();
         Self { plan, scale, bounds, surfaces, overview, focus, density, height, clearance, sight }
+    }
+
+    /// How much one sees from the streets.
+    pub(super) fn sight(&self) -> &Sight {
+        self.sight.get_or_init(|| {
+            let eye = |cell: usize| f64::from(self.height[cell]) + self.eye_height();
+            Sight::new(&self.surfaces, self.scale, |cell| self.clearance[cell] > 0.0, eye)
+        })
     }
 
     /// What is seen around a place.

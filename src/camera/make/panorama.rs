@@ -80,34 +80,52 @@ fn column(
     ahead: DVec2,
     slopes: &[f64; ELEVATIONS],
 ) -> u64 {
-    let cells = &surfaces.cells;
+    let (cells, blocks) = (&surfaces.cells, &surfaces.blocks);
     let start = eye.truncate();
     // Nothing is divided by 0 along an axis.
     let ahead = DVec2::select(ahead.cmpeq(DVec2::ZERO), DVec2::splat(1e-12), ahead);
-    let mut seen = 0;
-    for cell in cells.along(start, ahead, [0.0, far]) {
-        let is_within = |inner: &Cells| inner.at(cells.middle(cell)).is_some();
-        if !surfaces.is_covered(cell) || inner.is_some_and(is_within) {
-            continue;
-        }
-        let [first, last] = surfaces.rectangle(cell).map(|side| (side - start) / ahead);
+    // From where to where the line is in a rectangle; neither beside it nor behind.
+    let crossed = |rectangle: [DVec2; 2]| {
+        let [first, last] = rectangle.map(|side| (side - start) / ahead);
         let near = first.min(last).max_element().max(0.0);
         let far = first.max(last).min_element();
-        // Neither beside nor behind.
-        if near > far || far <= 0.0 {
-            continue;
-        }
-        let [low, high] = [surfaces.low[cell], surfaces.high[cell]].map(|z| f64::from(z) - eye.z);
+        (near <= far && far > 0.0).then_some([near, far])
+    };
+    // The elevations of what is so high, between two distances.
+    let bits = |heights: [f32; 2], [near, far]: [f64; 2]| {
+        let [low, high] = heights.map(|z| f64::from(z) - eye.z);
         let least = low / if low < 0.0 { near } else { far };
         let most = high / if high > 0.0 { near } else { far };
         let from = slopes.partition_point(|&slope| slope < least);
         let to = slopes.partition_point(|&slope| slope <= most);
-        if from < to {
-            seen |= u64::MAX >> (ELEVATIONS - (to - from)) << from;
+        if from < to { u64::MAX >> (ELEVATIONS - (to - from)) << from } else { 0 }
+    };
+    let mut seen = 0;
+    for block in blocks.along(start, ahead, [0.0, far]) {
+        let Some(heights) = surfaces.block_heights(block) else { continue };
+        let middle = blocks.middle(block);
+        let half = DVec2::splat(blocks.side / 2.0 + cells.side * BLOCK_SLACK);
+        let Some([enters, leaves]) = crossed([middle - half, middle + half]) else { continue };
+        // Most blocks far away add nothing to what stands before them.
+        if bits(heights, [enters, leaves]) & !seen == 0 {
+            continue;
+        }
+        for cell in cells.along(start, ahead, [enters, leaves.min(far)]) {
+            let is_within = |inner: &Cells| inner.at(cells.middle(cell)).is_some();
+            if !surfaces.is_covered(cell) || inner.is_some_and(is_within) {
+                continue;
+            }
+            if let Some(range) = crossed(surfaces.rectangle(cell)) {
+                seen |= bits([surfaces.low[cell], surfaces.high[cell]], range);
+            }
         }
     }
     seen
 }
+
+/// By what share of a cell a block may seem smaller than its cells together, since coordinates are
+/// rounded.
+const BLOCK_SLACK: f64 = 1e-3;
 
 /// The directions of the points of a picture with some pitch.
 #[derive(Clone, Debug)]
@@ -203,5 +221,28 @@ mod tests {
         let above = Panorama::new(&surfaces, DVec3::new(0.3, 0.7, 60.0));
         let part = above.part(&Picture::new(-80.0), 40.0);
         assert!((part - 0.25).abs() < 0.06, "{part}");
+    }
+
+    #[test]
+    fn blocks_that_are_left_out_add_nothing() {
+        let mut random = crate::random::Random::new(5, 0);
+        let mut unit = || random.unit();
+        let mut surfaces = map(0.5);
+        for _ in 0..300 {
+            let [x, y, side, z] = [200.0, 200.0, 12.0, 9.0].map(|most| unit() * most);
+            let at = |i: f64, j: f64| DVec3::new(x - 100.0 + i * side, y - 100.0 + j * side, z);
+            square(&mut surfaces, [at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)]);
+        }
+        // The same surfaces, of which every block may add something.
+        let mut unknown = surfaces.clone();
+        unknown.raise_blocks();
+        for _ in 0..60 {
+            let [x, y, z] = [300.0, 300.0, 40.0].map(|most| unit() * most);
+            let eye = DVec3::new(x - 150.0, y - 150.0, z);
+            for far in [30.0, f64::INFINITY] {
+                let [some, all] = [&surfaces, &unknown].map(|map| Panorama::within(far, map, eye));
+                assert_eq!(some.columns, all.columns, "{eye} {far}");
+            }
+        }
     }
 }

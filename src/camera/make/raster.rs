@@ -106,13 +106,28 @@ pub(super) struct Surfaces {
     /// The part of each cell that its surfaces are over or under: a rectangle, as least and greatest
     /// x and y in cells from its corner, 0 to 1.
     rectangles: Vec<[Vec2; 2]>,
+    /// Squares of [`BLOCK`] by [`BLOCK`] cells.
+    pub(super) blocks: Cells,
+    /// The lowest and the highest surface within each block, as of cells.
+    block_heights: Vec<[f32; 2]>,
     visits_left: u64,
 }
+
+/// Cells along the side of a block.
+const BLOCK: usize = 16;
 
 impl Surfaces {
     pub(super) fn new(cells: Cells) -> Self {
         let count = cells.len();
+        let blocks = Cells {
+            corner: cells.corner,
+            side: cells.side * BLOCK as f64,
+            columns: cells.columns.div_ceil(BLOCK),
+            rows: cells.rows.div_ceil(BLOCK),
+        };
         Self {
+            block_heights: vec![[f32::INFINITY, f32::NEG_INFINITY]; blocks.len()],
+            blocks,
             cells,
             low: vec![f32::INFINITY; count],
             high: vec![f32::NEG_INFINITY; count],
@@ -172,6 +187,9 @@ impl Surfaces {
         let cell = row * self.cells.columns + column;
         self.low[cell] = self.low[cell].min(min.z);
         self.high[cell] = self.high[cell].max(max.z);
+        let block = row / BLOCK * self.blocks.columns + column / BLOCK;
+        let [low, high] = &mut self.block_heights[block];
+        (*low, *high) = (low.min(min.z), high.max(max.z));
         let corner = Vec2::new(column as f32, row as f32);
         let [least, greatest] = &mut self.rectangles[cell];
         *least = least.min(min.truncate() - corner);
@@ -183,6 +201,17 @@ impl Surfaces {
         let Cells { corner, side, columns, .. } = self.cells;
         let first = DVec2::new((cell % columns) as f64, (cell / columns) as f64);
         self.rectangles[cell].map(|at| corner + (first + at.as_dvec2()) * side)
+    }
+
+    /// The lowest and the highest surface within a block; `None` where there is none.
+    pub(super) fn block_heights(&self, block: usize) -> Option<[f32; 2]> {
+        Some(self.block_heights[block]).filter(|[low, high]| low <= high)
+    }
+
+    /// As if each block had surfaces at all heights.
+    #[cfg(test)]
+    pub(super) fn raise_blocks(&mut self) {
+        self.block_heights.fill([f32::NEG_INFINITY, f32::INFINITY]);
     }
 
     /// True where a cell has any surface.

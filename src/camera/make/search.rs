@@ -26,7 +26,7 @@ pub(super) fn prices(ground: &Ground, is_open: &[bool]) -> Vec<u32> {
             return 0;
         }
         let tight = 1.0 - (ground.clearance[cell] / room).min(1.0);
-        let seen = f64::from(ground.sight.at(ground.surfaces.cells.middle(cell)).level);
+        let seen = f64::from(ground.sight().at(ground.surfaces.cells.middle(cell)).level);
         let blind = 1.0 - (seen / SEEN).min(1.0);
         let dearer = 1.0 + TIGHT * f64::from(tight) + BLIND * blind;
         (dearer * 64.0) as u32

@@ -31,7 +31,7 @@ impl<'a> Streets<'a> {
     pub(super) fn find(ground: &'a Ground) -> Option<Self> {
         let sees = |cell: usize| {
             let place = ground.surfaces.cells.middle(cell);
-            f64::from(ground.sight.at(place).any) >= ENOUGH
+            f64::from(ground.sight().at(place).any) >= ENOUGH
         };
         let cells = &ground.surfaces.cells;
         let is_covered = |cell: usize| ground.surfaces.is_covered(cell);
@@ -107,6 +107,6 @@ fn keep_away(ground: &Ground) -> f32 {
 }
 
 fn interest(ground: &Ground, cell: usize) -> f64 {
-    let part = f64::from(ground.sight.at(ground.surfaces.cells.middle(cell)).level);
+    let part = f64::from(ground.sight().at(ground.surfaces.cells.middle(cell)).level);
     BLIND + part * part
 }
