@@ -14,6 +14,8 @@ pub(super) struct Node {
     low: Points,
     high: Points,
     pub children: [u32; LANES],
+    /// `None` where the boxes are good enough.
+    oriented: Option<Box<OrientedBoxes>>,
 }
 
 impl Node {
@@ -24,10 +26,11 @@ impl Node {
             low: Points::from_fn(|lane| of(lane).1.low),
             high: Points::from_fn(|lane| of(lane).1.high),
             children: std::array::from_fn(|lane| of(lane).0),
+            oriented: None,
         }
     }
 
-    /// The squared distances of a point to the boxes.
+    /// The squared distances of a point to the children, or somewhat less.
     #[inline(always)]
     pub fn squared_distances(&self, point: Vec3) -> Lanes {
         let mut squared = [0.0; LANES];
@@ -37,6 +40,10 @@ impl Node {
             let y = outside(self.low.y[lane], self.high.y[lane], point.y);
             let z = outside(self.low.z[lane], self.high.z[lane], point.z);
             *squared = x * x + y * y + z * z;
+        }
+        if let Some(oriented) = &self.oriented {
+            let of_oriented = oriented.squared_distances(point);
+            squared = std::array::from_fn(|lane| max(squared[lane], of_oriented[lane]));
         }
         squared
     }
@@ -50,6 +57,81 @@ impl Node {
         boxes.filter(|(_, bounds)| !bounds.is_empty())
     }
 }
+
+/// Children's boxes overlap where their areas sum up to more than so many times that of the box
+/// around all: half of those of a surface that is divided well do.
+const OVERLAP: f32 = 3.0;
+
+/// Eight boxes with axes of their own.
+///
+/// The triangles of a fan are long and thin, and lie across the axes: many axis-aligned boxes overlap, all of
+/// which hold a point near their common corner, and a search would go into each. Boxes along the
+/// triangles are as thin as these (Gottschalk, Lin and Manocha 1996, "OBBTree").
+#[derive(Debug)]
+struct OrientedBoxes {
+    origin: Points,
+    axes: [Points; 3],
+    low: [Lanes; 3],
+    high: [Lanes; 3],
+}
+
+impl OrientedBoxes {
+    /// Each around triangles, of which there is one at least, along the one with the longest edge.
+    fn around(groups: &[Vec<[Vec3; 3]>]) -> Self {
+        let longest = |group: &Vec<[Vec3; 3]>| {
+            let squared = |[a, b, c]: [Vec3; 3]| {
+                let ab = a.distance_squared(b);
+                ab.max(b.distance_squared(c)).max(c.distance_squared(a))
+            };
+            let first = group.first().copied().unwrap_or_default();
+            let longer = |a, b| if squared(b) > squared(a) { b } else { a };
+            Triangle::new(group.iter().copied().fold(first, longer))
+        };
+        let frames: Vec<Triangle> = groups.iter().map(longest).collect();
+        let axes = |lane: usize| {
+            let frame = frames.get(lane);
+            frame.map_or([Vec3::ZERO; 3], |Triangle { along, up, .. }| {
+                [*along, *up, along.cross(*up)]
+            })
+        };
+        let extent = |lane: usize, axis: usize| {
+            let Some(group) = groups.get(lane) else { return [f32::INFINITY, f32::NEG_INFINITY] };
+            let (origin, axis) = (frames[lane].origin, axes(lane)[axis]);
+            let places = group.iter().flatten().map(|&corner| (corner - origin).dot(axis));
+            let (low, high) =
+                places.fold((0f32, 0f32), |(low, high), at| (low.min(at), high.max(at)));
+            let farthest = group.iter().flatten().map(|corner| corner.distance(origin));
+            let slack = ORIENTED_ROUNDING * farthest.fold(0.0, f32::max);
+            [low - slack, high + slack]
+        };
+        let extents: [[[f32; 2]; LANES]; 3] =
+            std::array::from_fn(|axis| std::array::from_fn(|lane| extent(lane, axis)));
+        Self {
+            origin: Points::from_fn(|lane| frames.get(lane).map_or(Vec3::ZERO, |at| at.origin)),
+            axes: std::array::from_fn(|axis| Points::from_fn(|lane| axes(lane)[axis])),
+            low: extents.map(|lanes| lanes.map(|[low, _]| low)),
+            high: extents.map(|lanes| lanes.map(|[_, high]| high)),
+        }
+    }
+
+    #[inline(always)]
+    fn squared_distances(&self, point: Vec3) -> Lanes {
+        let mut squared = [0.0; LANES];
+        for (lane, squared) in squared.iter_mut().enumerate() {
+            let way = point - self.origin.lane(lane);
+            for axis in 0..3 {
+                let at = way.dot(self.axes[axis].lane(lane));
+                let outside = max(max(self.low[axis][lane] - at, at - self.high[axis][lane]), 0.0);
+                *squared += outside * outside;
+            }
+            *squared *= 1.0 - 2.0 * ORIENTED_ROUNDING;
+        }
+        squared
+    }
+}
+
+/// By what share of itself a coordinate along an axis may be wrong.
+const ORIENTED_ROUNDING: f32 = 16.0 * f32::EPSILON;
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug)]
@@ -85,6 +167,11 @@ impl Box3 {
         self.low.distance(self.high)
     }
 
+    fn half_area(&self) -> f32 {
+        let Vec3 { x, y, z } = self.high - self.low;
+        x * y + y * z + z * x
+    }
+
     /// The largest absolute coordinate.
     pub fn magnitude(&self) -> f32 {
         if self.is_empty() { 0.0 } else { self.low.abs().max(self.high.abs()).max_element() }
@@ -101,9 +188,14 @@ pub(super) struct Tree {
 impl Tree {
     /// A tree over boxes, at most so many to a leaf, and the boxes of each leaf.
     pub fn new(boxes: &[Box3], most: usize) -> (Self, Vec<Vec<u32>>) {
+        Self::over(boxes, &[], most)
+    }
+
+    /// A tree over triangles with these boxes.
+    fn over(boxes: &[Box3], triangles: &[[Vec3; 3]], most: usize) -> (Self, Vec<Vec<u32>>) {
         let member = |(number, bounds): (u32, &Box3)| Member { centre: bounds.centre(), number };
         let mut members: Vec<Member> = (0..).zip(boxes).map(member).collect();
-        let mut builder = Builder { boxes, most, nodes: Vec::new(), leaves: Vec::new() };
+        let mut builder = Builder { boxes, triangles, most, nodes: Vec::new(), leaves: Vec::new() };
         let (root, _) = builder.build(&mut members);
         (Self { nodes: builder.nodes, root }, builder.leaves)
     }
@@ -117,6 +209,8 @@ struct Member {
 
 struct Builder<'a> {
     boxes: &'a [Box3],
+    /// Empty where the boxes are of others.
+    triangles: &'a [[Vec3; 3]],
     most: usize,
     nodes: Vec<Node>,
     leaves: Vec<Vec<u32>>,
@@ -146,10 +240,17 @@ impl Builder<'_> {
         }
         let at = self.nodes.len();
         self.nodes.push(Node::new(&[]));
-        let children: Vec<(u32, Box3)> =
-            groups.into_iter().map(|group| self.build(group)).collect();
+        let children: Vec<(u32, Box3)> = groups.iter_mut().map(|group| self.build(group)).collect();
         self.nodes[at] = Node::new(&children);
-        (at as u32, children.into_iter().map(|(_, bounds)| bounds).fold(Box3::EMPTY, Box3::and))
+        let bounds = children.iter().map(|(_, bounds)| *bounds).fold(Box3::EMPTY, Box3::and);
+        let areas: f32 = children.iter().map(|(_, bounds)| bounds.half_area()).sum();
+        if !self.triangles.is_empty() && areas > OVERLAP * bounds.half_area() {
+            let triangle = |member: &Member| self.triangles[member.number as usize];
+            let triangles: Vec<Vec<[Vec3; 3]>> =
+                groups.iter().map(|group| group.iter().map(triangle).collect()).collect();
+            self.nodes[at].oriented = Some(Box::new(OrientedBoxes::around(&triangles)));
+        }
+        (at as u32, bounds)
     }
 }
 
@@ -185,7 +286,7 @@ impl Bvh {
         let corners = |&triangle: &[u32; 3]| triangle.map(|v| mesh.positions[v as usize].into());
         let corners: Vec<[Vec3; 3]> = mesh.triangles.iter().map(corners).collect();
         let boxes: Vec<Box3> = corners.iter().map(|&corners| Box3::of(corners)).collect();
-        let (tree, leaves) = Tree::new(&boxes, LANES);
+        let (tree, leaves) = Tree::over(&boxes, &corners, LANES);
         // Of coordinates beyond, and those that are none, nothing can be computed.
         let is_usable = |corner: &Vec3| corner.is_finite() && corner.abs().max_element() < LARGEST;
         let all_usable = corners.as_flattened().iter().all(is_usable);
@@ -208,5 +309,92 @@ impl Bvh {
         let counts = leaves.iter().map(|members| members.len() as u8).collect();
         let bounds = boxes.into_iter().fold(Box3::EMPTY, Box3::and);
         (Self { tree, leaves: frames, counts, bounds, longest }, leaves)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::TAU;
+
+    use super::super::NearestTriangle;
+    use super::*;
+    use crate::random::Random;
+    use crate::scaling::assert_scales;
+
+    /// A cone of so many triangles around its tip.
+    fn cone(count: usize) -> Mesh {
+        let rim = (0..count).map(|at| {
+            let (sin, cos) = (TAU * at as f32 / count as f32).sin_cos();
+            [100.0 * cos, 100.0 * sin, 0.0]
+        });
+        let next = |at: u32| (at % count as u32 + 1, (at + 1) % count as u32 + 1);
+        Mesh {
+            positions: std::iter::once([0.0, 0.0, 30.0]).chain(rim).collect(),
+            triangles: (0..count as u32).map(next).map(|(a, b)| [0, a, b]).collect(),
+            ..Mesh::default()
+        }
+    }
+
+    fn points(count: usize) -> Vec<Vec3> {
+        let mut random = Random::new(11, 0);
+        let mut unit = || random.unit() as f32;
+        let point = |_| {
+            let (sin, cos) = (TAU * unit()).sin_cos();
+            let from_tip = unit();
+            let z = 30.0 * (1.0 - from_tip) + 4.0 * unit() - 2.0;
+            Vec3::new(100.0 * from_tip * cos, 100.0 * from_tip * sin, z)
+        };
+        (0..count).map(point).collect()
+    }
+
+    #[test]
+    fn the_nearest_triangle_of_a_cone_is_that_of_looking_at_all() {
+        let mesh = cone(700);
+        let nearest = NearestTriangle::of(&mesh).unwrap();
+        let mut search = nearest.search();
+        let squared = |number: usize, point: Vec3| {
+            let corners = mesh.triangles[number].map(|at| mesh.positions[at as usize].into());
+            Triangle::new(corners).squared_distance(point)
+        };
+        for point in points(300) {
+            let least = (0..700).map(|number| squared(number, point)).fold(f32::MAX, f32::min);
+            let found = squared(search(point) as usize, point);
+            assert!(found <= least * 1.0001 + 1e-9, "{found} {least} at {point}");
+        }
+    }
+
+    #[test]
+    fn few_boxes_of_a_fan_hold_a_point() {
+        let visited = |count: usize| {
+            let (bvh, _) = Bvh::new(&cone(count));
+            let visited = |point: Vec3| {
+                let mut open = vec![bvh.tree.root];
+                let mut leaves = 0;
+                while let Some(child) = open.pop() {
+                    if child & LEAF != 0 {
+                        leaves += 1;
+                        continue;
+                    }
+                    let node = &bvh.tree.nodes[child as usize];
+                    let squared = node.squared_distances(point);
+                    let near = (0..LANES).filter(|&lane| squared[lane] < 0.01);
+                    open.extend(near.map(|lane| node.children[lane]));
+                }
+                leaves
+            };
+            points(200).into_iter().map(visited).sum::<usize>()
+        };
+        let [some, many] = [1000, 16_000].map(visited);
+        assert!(many < 6 * some, "{some} {many}");
+    }
+
+    #[test]
+    fn time_scales_with_the_triangles_of_a_fan() {
+        let searched = |count: usize| (cone(count), points(count));
+        assert_scales(1000, searched, |(mesh, points)| {
+            let nearest = NearestTriangle::of(&mesh).unwrap();
+            let mut search = nearest.search();
+            points.into_iter().map(&mut search).max()
+        });
     }
 }
