@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::builder::blocks::block_plan::{BlockSize, Division};
 use crate::builder::border::chain::{Chain, CutPlane, KeepRule};
@@ -73,13 +73,21 @@ pub fn gather(materials: &[Material], parts: &[Part], between: &[Stitch]) -> Chu
 /// vertex that looks like the nearer of them, where it has none.
 fn stitched(mesh: &mut Mesh<f64>, between: &[Stitch]) -> Vec<[u32; 3]> {
     let of_stitch = |stitch: &Stitch| [stitch.edge[0], stitch.edge[1], stitch.apex].map(key);
-    let mut at: FxHashMap<PositionKey<f64>, Vec<u32>> =
-        between.iter().flat_map(of_stitch).map(|position| (position, Vec::new())).collect();
+    let sought: FxHashSet<PositionKey<f64>> = between.iter().flat_map(of_stitch).collect();
+    let vertex_key = |mesh: &Mesh<f64>, position: [f64; 3], like: u32| -> VertexKey {
+        let like = like as usize;
+        let texcoord = mesh.texcoords.get(like).copied().map_or(0, texcoord_key);
+        let color = mesh.colors.get(like).copied().map_or(0, color_key);
+        (key(position), texcoord, color, mesh.materials[like])
+    };
+    let mut vertices: FxHashMap<VertexKey, u32> = FxHashMap::default();
+    let mut found: FxHashSet<PositionKey<f64>> = FxHashSet::default();
     let mut is_there = vec![false; mesh.positions.len()];
-    for (vertex, &position) in mesh.positions.iter().enumerate() {
-        if let Some(vertices) = at.get_mut(&key(position)) {
-            vertices.push(vertex as u32);
-            is_there[vertex] = true;
+    for (vertex, &position) in (0u32..).zip(&mesh.positions) {
+        if sought.contains(&key(position)) {
+            vertices.entry(vertex_key(mesh, position, vertex)).or_insert(vertex);
+            found.insert(key(position));
+            is_there[vertex as usize] = true;
         }
     }
     let mut edges: FxHashMap<[PositionKey<f64>; 2], [u32; 2]> = FxHashMap::default();
@@ -92,26 +100,16 @@ fn stitched(mesh: &mut Mesh<f64>, between: &[Stitch]) -> Vec<[u32; 3]> {
     }
     let mut stitches = Vec::with_capacity(between.len());
     for stitch in between {
-        let (Some(&[a, b]), Some(vertices)) =
-            (edges.get(&stitch.edge.map(key)), at.get_mut(&key(stitch.apex)))
-        else {
-            continue;
-        };
-        if vertices.is_empty() {
+        let Some(&[a, b]) = edges.get(&stitch.edge.map(key)) else { continue };
+        if !found.contains(&key(stitch.apex)) {
             continue;
         }
         let apex = wide(stitch.apex);
         let [from_a, from_b] = stitch.edge.map(|end| wide(end).distance_squared(apex));
         let like = if from_a <= from_b { a } else { b };
-        let looks = |vertex: u32| {
-            let vertex = vertex as usize;
-            (mesh.texcoords.get(vertex), mesh.colors.get(vertex), mesh.materials[vertex])
-        };
-        let known = vertices.iter().copied().find(|&vertex| looks(vertex) == looks(like));
-        let apex = known.unwrap_or_else(|| {
+        let apex = *vertices.entry(vertex_key(mesh, stitch.apex, like)).or_insert_with(|| {
             let vertex = mesh.push_copy(like as usize);
             mesh.positions[vertex as usize] = stitch.apex;
-            vertices.push(vertex);
             vertex
         });
         stitches.push([b, a, apex]);

@@ -6,6 +6,7 @@
 //! is narrower is no feature of such a surface. In a scan that is half of an edge; among houses with
 //! walls of many metres it is less than any alley.
 
+use std::collections::BTreeMap;
 use std::hash::Hasher;
 use std::ops::Range;
 
@@ -17,6 +18,7 @@ use super::open_edges::{OpenEdge, open_edges};
 use super::strip::{LEAST_LENGTH, Stitch, Strip, nearest_on};
 use crate::builder::constants::StitchConstants;
 use crate::mesh::{Part, PositionKey, key, wide};
+use crate::stage_timer::StageTimer;
 
 /// The strips between all borders of some parts that touch; `kinds` says for each what it looks
 /// like: the first of those materials that differ in nothing but their images. Only borders of one
@@ -84,12 +86,60 @@ struct Borders {
     /// a vertex in common.
     from: AtPosition,
     to: AtPosition,
+    /// The edges by place, those of about the same reach together.
+    grids: Vec<Grid>,
+}
+
+/// Edges by the cells that they run through.
+struct Grid {
     /// Which edges run through which cell, by cell.
     entered: Vec<(Cell, u32)>,
     /// The range of `entered` that is of each cell.
     cells: FxHashMap<Cell, Range<usize>>,
-    /// The side of a cell, at least [`SIDE`] times the largest reach.
+    /// The side of a cell, at least [`SIDE`] times the largest reach of the edges.
     side: f64,
+}
+
+impl Grid {
+    /// Of numbered edges, of which none reaches farther than `widest`.
+    fn new(edges: &[(u32, [DVec3; 2])], widest: f64) -> Self {
+        let mut lengths: Vec<f64> =
+            edges.iter().map(|(_, [from, to])| from.distance(*to)).collect();
+        let middle = lengths.len() / 2;
+        let median = *lengths.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let side = (SIDE * widest).max(median).max(f64::MIN_POSITIVE);
+        let mut entered: Vec<(Cell, u32)> = Vec::with_capacity(2 * edges.len());
+        for &(number, [from, to]) in edges {
+            let pieces = (from.distance(to) / (side * SPACING)).ceil().max(1.0) as usize;
+            for piece in 0..=pieces {
+                let cell = cell(from.lerp(to, piece as f64 / pieces as f64), side);
+                if entered.last() != Some(&(number_of(cell), number)) {
+                    entered.push((number_of(cell), number));
+                }
+            }
+        }
+        entered.sort_unstable();
+        entered.dedup();
+        let mut cells: FxHashMap<Cell, Range<usize>> = FxHashMap::default();
+        for (at, (cell, _)) in entered.iter().enumerate() {
+            cells.entry(*cell).or_insert(at..at).end = at + 1;
+        }
+        Self { entered, cells, side }
+    }
+
+    /// The edges near a place, some more than once.
+    fn near(&self, place: DVec3) -> impl Iterator<Item = u32> {
+        // Of an edge within reach, one of the points that were entered is no farther than this.
+        let beyond = self.side * (1.0 / SIDE + 0.5 * SPACING);
+        let [low, high] = [-beyond, beyond].map(|by| cell(place + by, self.side));
+        let line = move |x: i64, y: i64| (low[2]..=high[2]).map(move |z| [x, y, z]);
+        let cells =
+            (low[0]..=high[0]).flat_map(move |x| (low[1]..=high[1]).flat_map(move |y| line(x, y)));
+        let there = |at| self.cells.get(&number_of(at)).cloned().unwrap_or_default();
+        let entered =
+            cells.flat_map(move |at| self.entered[there(at)].iter().map(|(_, edge)| *edge));
+        entered.take(MOST_NEAR)
+    }
 }
 
 /// By position, the edges that start or end there, the last first.
@@ -106,11 +156,20 @@ impl AtPosition {
         Self { last, before }
     }
 
+    /// Some of them, where they are more than [`MOST_AT_VERTEX`].
     fn at(&self, position: [f64; 3]) -> impl Iterator<Item = u32> {
         let last = self.last.get(&key(position)).copied();
-        std::iter::successors(last, |&edge| self.before[edge as usize])
+        std::iter::successors(last, |&edge| self.before[edge as usize]).take(MOST_AT_VERTEX)
     }
 }
+
+/// Open edges that start or end at a vertex and are told apart, at most: where more do, there is no
+/// border to follow, and looking at all of them at each would take quadratic time.
+const MOST_AT_VERTEX: usize = 32;
+
+/// Edges that are looked at around a vertex, of one [`Grid`], at most: where more are, triangles
+/// lie across each other rather than beside each other.
+const MOST_NEAR: usize = 2048;
 
 /// The least side of a cell, in the largest reach: mostly one cell is looked into.
 const SIDE: f64 = 8.0;
@@ -132,36 +191,25 @@ const MOST_STEPS: usize = 64;
 /// have. The sides of a notch between two teeth of a border have more.
 const SIDE_BY_SIDE: f64 = 0.85;
 
+/// Open edges whose partners one thread looks for at a time.
+const CHUNK: u32 = 1024;
+
 /// Nor back by more, where nearest vertices are not in order.
 const MOST_BACK: usize = 4;
 
 impl Borders {
     fn new(edges: Vec<OpenEdge>, kinds: Vec<Option<u32>>, reach: Vec<f64>) -> Self {
         let [from, to] = [0, 1].map(|end| AtPosition::new(edges.iter().map(|edge| edge.ends[end])));
-        let mut lengths: Vec<f64> =
-            edges.iter().map(|edge| wide(edge.ends[0]).distance(wide(edge.ends[1]))).collect();
-        let middle = lengths.len() / 2;
-        let median = *lengths.select_nth_unstable_by(middle, f64::total_cmp).1;
-        let widest = reach.iter().copied().fold(0.0, f64::max);
-        let side = (SIDE * widest).max(median).max(f64::MIN_POSITIVE);
-        let mut entered: Vec<(Cell, u32)> = Vec::with_capacity(2 * edges.len());
-        for (number, edge) in (0..).zip(&edges) {
-            let [from, to] = edge.ends.map(wide);
-            let pieces = (from.distance(to) / (side * SPACING)).ceil().max(1.0) as usize;
-            for piece in 0..=pieces {
-                let cell = cell(from.lerp(to, piece as f64 / pieces as f64), side);
-                if entered.last() != Some(&(number_of(cell), number)) {
-                    entered.push((number_of(cell), number));
-                }
-            }
+        // Powers of two of the reach.
+        let mut of_reach: BTreeMap<i32, Vec<(u32, [DVec3; 2])>> = BTreeMap::new();
+        for (number, (edge, reach)) in (0..).zip(edges.iter().zip(&reach)) {
+            let class = reach.max(f64::MIN_POSITIVE).log2().ceil() as i32;
+            of_reach.entry(class).or_default().push((number, edge.ends.map(wide)));
         }
-        entered.sort_unstable();
-        entered.dedup();
-        let mut cells: FxHashMap<Cell, Range<usize>> = FxHashMap::default();
-        for (at, (cell, _)) in entered.iter().enumerate() {
-            cells.entry(*cell).or_insert(at..at).end = at + 1;
-        }
-        Self { edges, kinds, reach, from, to, entered, cells, side }
+        let grids =
+            of_reach.iter().map(|(&class, edges)| Grid::new(edges, f64::from(class).exp2()));
+        let grids = grids.collect();
+        Self { edges, kinds, reach, from, to, grids }
     }
 
     fn edge(&self, number: u32) -> &OpenEdge {
@@ -225,8 +273,13 @@ impl Borders {
                 Some((key(self.edge(edge).ends[end]), self.partner(edge, end)?))
             })
         };
-        let edges = (0..self.edges.len() as u32).into_par_iter();
-        edges.flat_map_iter(partners).collect::<Vec<_>>().into_iter().collect()
+        let timer = StageTimer::current();
+        let of_chunk = |first: u32| {
+            let edges = first..(first + CHUNK).min(self.edges.len() as u32);
+            timer.time(|| edges.flat_map(partners).collect::<Vec<_>>())
+        };
+        let chunks = (0..self.edges.len() as u32).into_par_iter().step_by(CHUNK as usize);
+        chunks.map(of_chunk).collect::<Vec<_>>().into_iter().flatten().collect()
     }
 
     /// The vertex of another border that the end of an edge is nearest to, if it touches one.
@@ -235,7 +288,7 @@ impl Borders {
         let beside = if end == 0 { self.previous(edge) } else { self.next(edge) };
         let place = wide(at);
         let mut nearest: Option<(f64, u32, f64)> = None;
-        for other in self.near(place) {
+        for other in self.grids.iter().flat_map(|grid| grid.near(place)) {
             let reach = self.reach[edge as usize].min(self.reach[other as usize]);
             let (distance, along) = self.distance(other, place);
             let is_nearer =
@@ -252,18 +305,6 @@ impl Borders {
         let (_, other, along) = nearest?;
         let OpenEdge { part, ends, .. } = *self.edge(other);
         Some(Partner { at: ends[usize::from(along > 0.5)], part })
-    }
-
-    /// The edges near a place, some more than once.
-    fn near(&self, place: DVec3) -> impl Iterator<Item = u32> {
-        // Of an edge within reach, one of the points that were entered is no farther than this.
-        let beyond = self.side * (1.0 / SIDE + 0.5 * SPACING);
-        let [low, high] = [-beyond, beyond].map(|by| cell(place + by, self.side));
-        let line = move |x: i64, y: i64| (low[2]..=high[2]).map(move |z| [x, y, z]);
-        let cells =
-            (low[0]..=high[0]).flat_map(move |x| (low[1]..=high[1]).flat_map(move |y| line(x, y)));
-        let there = |at| self.cells.get(&number_of(at)).cloned().unwrap_or_default();
-        cells.flat_map(move |at| self.entered[there(at)].iter().map(|(_, edge)| *edge))
     }
 
     /// The distance of a place from an edge, and how far along it the nearest point is, 0–1.
@@ -415,6 +456,7 @@ fn number_of(cell: [i64; 3]) -> Cell {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scaling::assert_scales;
 
     /// A sheet of `nx` by `ny` squares from one corner to another, at heights.
     fn sheet(
@@ -578,5 +620,49 @@ mod tests {
         };
         let [a, b] = parts.clone();
         assert_eq!(places(&between(&parts)), places(&between(&[b, a])));
+    }
+
+    /// Triangles `of` corners on a circle around two points, with a number each.
+    fn around(count: usize, of: impl Fn(usize, [f64; 3]) -> [[f64; 3]; 3]) -> Part {
+        let corner = |number: usize| {
+            let (sin, cos) = (number as f64 / count as f64 * std::f64::consts::TAU).sin_cos();
+            of(number, [10.0 * cos, 10.0 * sin, 5.0])
+        };
+        let positions: Vec<[f64; 3]> = (0..count).flat_map(corner).collect();
+        Part { indices: (0..positions.len() as u32).collect(), positions, ..Part::default() }
+    }
+
+    #[test]
+    fn time_scales_where_many_triangles_have_a_vertex_or_an_edge_in_common() {
+        let top = [0.0, 0.0, 10.0];
+        // The pages of a book, and loose triangles around a vertex.
+        let book = |count: usize| around(count, |_, at| [[0.0; 3], top, at]);
+        let spokes = |count: usize| {
+            around(count, |_, [x, y, z]| [[0.0; 3], [x, y, z], [x, y, z + 10.0 / count as f64]])
+        };
+        assert_scales(500, book, |part| between(&[part]));
+        assert_scales(500, spokes, |part| between(&[part]));
+    }
+
+    #[test]
+    fn time_scales_where_many_triangles_are_at_nearly_one_place() {
+        let pile = |count: usize| {
+            around(count, |number, _| {
+                let z = number as f64 * 1e-6;
+                [[0.0, 0.0, z], [10.0, z, z], [z, 10.0, z]]
+            })
+        };
+        assert_scales(500, pile, |part| between(&[part]));
+    }
+
+    #[test]
+    fn time_scales_where_fine_borders_are_beside_coarse_ones() {
+        let fine = |count: usize| {
+            let squares = count as u32 / 2;
+            let width = 0.01 * f64::from(squares);
+            let coarse = sheet([0.0, -1000.0], [20_000.0, -0.001], 20, 1, flat);
+            vec![coarse, sheet([0.0, 0.0], [width, 0.01], squares, 1, flat)]
+        };
+        assert_scales(1000, fine, |parts| between(&parts));
     }
 }
