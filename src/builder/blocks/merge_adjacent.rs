@@ -6,12 +6,13 @@
 //! left of a root's budget for what lies between. Such blocks are made one, and cut where it suits
 //! the tree: borders at cutting planes thin from level to level.
 
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::builder::blocks::block_plan::{BlockPlan, BlockSize, Division};
 use crate::builder::border::shared::{Bounds, bounds_of, each_shared};
 use crate::builder::stitch::Stitch;
-use crate::mesh::{Model, Part};
+use crate::mesh::{DisjointSet, Model, Part};
 
 /// Joins the plans that have more than `most` vertices in common with others, or as many `stitches`
 /// to them, each with the plan that it has most in common with, until none has. The results are at
@@ -51,12 +52,13 @@ pub fn merge_adjacent(
     };
     let together = |plans: Vec<BlockPlan>| {
         let most = plans.iter().map(size).fold(limit, BlockSize::max);
-        plans.into_iter().reduce(|mut all, plan| {
+        let mut all = plans.into_iter().reduce(|mut all, plan| {
             all.parts.extend(plan.parts);
-            all.parts.sort_unstable();
             all.divide = Division::Halves(most);
             all
-        })
+        })?;
+        all.parts.sort_unstable();
+        Some(all)
     };
     sets.into_values().filter_map(together).collect()
 }
@@ -75,33 +77,72 @@ fn parts_of<'a>(model: &'a Model, plan: &'a BlockPlan) -> impl Iterator<Item = &
 }
 
 /// The set of each of `count` things, by its least member, where `shared` tells how much pairs have
-/// in common: that with the most in common with others is joined with the one that it has most in
+/// in common: the set with the most in common with others is joined with the one that it has most in
 /// common with, until none has more than `most`.
+///
+/// Each join moves the links of the set with fewer links, so that a link moves log n times at most.
 fn joined(count: usize, shared: &BTreeMap<[usize; 2], usize>, most: usize) -> Vec<usize> {
-    let mut set_of: Vec<usize> = (0..count).collect();
-    let mut common: Vec<BTreeMap<usize, usize>> = vec![BTreeMap::new(); count];
+    let mut sets = DisjointSet::new(count);
+    let mut links = vec![Links::default(); count];
     for (&[a, b], &vertices) in shared {
-        common[a].insert(b, vertices);
-        common[b].insert(a, vertices);
+        links[a].set(b, vertices);
+        links[b].set(a, vertices);
     }
-    let mut totals: Vec<usize> = common.iter().map(|others| others.values().sum()).collect();
-    loop {
-        // Of equals the first.
-        let heaviest = (0..count).rev().max_by_key(|&set| totals[set]);
-        let Some(heaviest) = heaviest.filter(|&set| totals[set] > most) else { return set_of };
-        let nearest = common[heaviest].iter().rev().max_by_key(|(_, vertices)| **vertices);
-        let Some((&nearest, _)) = nearest else { return set_of };
-        let (stays, goes) = (heaviest.min(nearest), heaviest.max(nearest));
-        set_of.iter_mut().filter(|set| **set == goes).for_each(|set| *set = stays);
-        for (other, vertices) in std::mem::take(&mut common[goes]) {
-            common[other].remove(&goes);
-            if other != stays {
-                *common[stays].entry(other).or_default() += vertices;
-                *common[other].entry(stays).or_default() += vertices;
+    // Of equals the first.
+    let mut order: BTreeSet<(usize, Reverse<usize>)> =
+        links.iter().enumerate().map(|(set, links)| (links.total, Reverse(set))).collect();
+    while let Some((total, Reverse(heaviest))) = order.pop_last()
+        && total > most
+        && let Some(nearest) = links[heaviest].largest()
+    {
+        order.remove(&(links[nearest].total, Reverse(nearest)));
+        sets.join(heaviest as u32, nearest as u32);
+        let size = |set: usize| (links[set].of.len(), Reverse(set));
+        let is_larger = size(heaviest) > size(nearest);
+        let (stays, goes) = if is_larger { (heaviest, nearest) } else { (nearest, heaviest) };
+        for (other, vertices) in std::mem::take(&mut links[goes]).of {
+            if other == stays {
+                links[stays].set(goes, 0);
+                continue;
             }
+            let both = vertices + links[stays].of.get(&other).copied().unwrap_or(0);
+            links[stays].set(other, both);
+            links[other].set(goes, 0);
+            links[other].set(stays, both);
         }
-        totals[goes] = 0;
-        totals[stays] = common[stays].values().sum();
+        order.insert((links[stays].total, Reverse(stays)));
+    }
+    (0..count as u32).map(|member| sets.root(member) as usize).collect()
+}
+
+/// What a set has in common with others.
+#[derive(Clone, Default)]
+struct Links {
+    of: BTreeMap<usize, usize>,
+    by_vertices: BTreeSet<(usize, Reverse<usize>)>,
+    total: usize,
+}
+
+impl Links {
+    /// Sets what it has in common with another set; 0 is nothing.
+    fn set(&mut self, other: usize, vertices: usize) {
+        let before = match vertices {
+            0 => self.of.remove(&other),
+            _ => self.of.insert(other, vertices),
+        };
+        if let Some(before) = before {
+            self.by_vertices.remove(&(before, Reverse(other)));
+            self.total -= before;
+        }
+        if vertices > 0 {
+            self.by_vertices.insert((vertices, Reverse(other)));
+            self.total += vertices;
+        }
+    }
+
+    /// The set that it has most in common with; of equals the first.
+    fn largest(&self) -> Option<usize> {
+        self.by_vertices.last().map(|&(_, Reverse(other))| other)
     }
 }
 
@@ -109,6 +150,7 @@ fn joined(count: usize, shared: &BTreeMap<[usize; 2], usize>, most: usize) -> Ve
 mod tests {
     use super::*;
     use crate::mesh::{Group, Warnings};
+    use crate::scaling::assert_scales;
 
     #[test]
     fn the_heaviest_is_joined_first_and_what_is_light_then_stays() {
@@ -118,6 +160,28 @@ mod tests {
         assert_eq!(joined(5, &shared, 75), [0, 0, 0, 3, 4]);
         assert_eq!(joined(5, &shared, 19), [0, 0, 0, 0, 4]);
         assert_eq!(joined(5, &shared, 0), [0; 5]);
+    }
+
+    #[test]
+    fn time_scales_with_the_number_of_sets() {
+        let link = |a: usize, b: usize, vertices: usize| ([a.min(b), a.max(b)], vertices);
+        // One that all others have something in common with, a chain, and a lattice.
+        let hub = |count: usize| (1..count).map(|at| link(0, at, 1 + at % 7)).collect();
+        let chain = |count: usize| (1..count).map(|at| link(at - 1, at, 1 + at % 7)).collect();
+        let lattice = |count: usize| {
+            let beside = |at: usize| [link(at, at + 1, 3 + at % 5), link(at, at + 30, 4 + at % 3)];
+            (0..count - 30).flat_map(beside).collect()
+        };
+        let shapes: [&dyn Fn(usize) -> BTreeMap<[usize; 2], usize>; 3] = [&hub, &chain, &lattice];
+        for shape in shapes {
+            assert_scales(
+                1000,
+                |count| (count, shape(count)),
+                |(count, shared)| {
+                    assert!(joined(count, &shared, 0).iter().all(|&set| set == 0));
+                },
+            );
+        }
     }
 
     /// A strip of squares along x, cut into groups of `each` squares that share their borders.

@@ -11,20 +11,20 @@ pub fn merge_untextured(model: &mut Model) {
         material.texture.is_none() && !matches!(material.alpha, AlphaMode::Mask { .. })
     };
     let class = |material: &Material| (material.alpha == AlphaMode::Blend, material.double_sided);
+    let mut is_used = vec![false; model.materials.len()];
+    for part in &model.parts {
+        if let Some(is_used) = is_used.get_mut(part.material as usize) {
+            *is_used = true;
+        }
+    }
     for sought in [(false, false), (false, true), (true, false), (true, true)] {
         let in_class: Vec<bool> = model
             .materials
             .iter()
             .map(|material| foldable(material) && class(material) == sought)
             .collect();
-        let used: Vec<u32> = (0u32..)
-            .zip(&in_class)
-            .filter(|&(number, &inside)| {
-                inside && model.parts.iter().any(|part| part.material == number)
-            })
-            .map(|(number, _)| number)
-            .collect();
-        if used.len() < 2 {
+        let used = in_class.iter().zip(&is_used).filter(|&(inside, used)| *inside && *used).count();
+        if used < 2 {
             continue;
         }
         let folded = model.materials.len() as u32;
@@ -57,6 +57,7 @@ pub fn merge_untextured(model: &mut Model) {
 mod tests {
     use super::*;
     use crate::mesh::{Group, Part, Warnings};
+    use crate::scaling::assert_scales;
 
     fn model(colors: &[[f32; 4]]) -> Model {
         let part = |material: u32| Part {
@@ -96,5 +97,14 @@ mod tests {
         merge_untextured(&mut single);
         assert_eq!((single.parts[0].material, single.materials.len()), (0, 1));
         assert!(single.parts[0].colors.is_empty());
+    }
+
+    #[test]
+    fn time_scales_with_the_number_of_materials() {
+        let of_colors = |count: usize| model(&vec![[0.5, 0.5, 0.5, 1.0]; count]);
+        assert_scales(1000, of_colors, |mut model| {
+            merge_untextured(&mut model);
+            assert_eq!(model.materials.len(), model.parts.len() + 1);
+        });
     }
 }

@@ -4,9 +4,10 @@
 //! borders, vertex by vertex. These borders are no cutting planes and need not be flat, so there
 //! are no skirts to cover what thinning would open: such vertices are kept at every level.
 
+use std::hash::Hasher;
 use std::sync::Arc;
 
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 
 use crate::builder::border::chain::CutPlane;
 use crate::builder::border::vertex::{Border, Path};
@@ -50,6 +51,9 @@ where
 }
 
 /// Calls `found` with each position that several blocks use, the first of them, and each other one.
+///
+/// Time is linear in the number of positions, however many blocks there are and however they overlap:
+/// positions are compared in those cells of a grid alone in which several blocks have any.
 pub fn each_shared<P>(
     blocks: &[Bounds],
     positions: impl Fn(usize) -> P,
@@ -57,24 +61,17 @@ pub fn each_shared<P>(
 ) where
     P: Iterator<Item = [f64; 3]>,
 {
+    let counts = (0..blocks.len()).map(|block| positions(block).count());
+    let mut cells =
+        CellUsers::new(bounds_of(blocks.iter().flat_map(|&(a, b)| [a, b])), counts.sum());
+    for block in 0..blocks.len() {
+        positions(block).for_each(|position| cells.add(position, block as u32));
+    }
     // The first block that uses a position, and the last.
     let mut users: FxHashMap<PositionKey<f64>, [u32; 2]> = FxHashMap::default();
-    for (number, bounds) in blocks.iter().enumerate() {
-        let others: Vec<&Bounds> = blocks
-            .iter()
-            .enumerate()
-            .filter(|&(other, _)| other != number)
-            .map(|(_, other)| other)
-            .filter(|other| meet(bounds, other))
-            .collect();
-        if others.is_empty() {
-            continue;
-        }
+    for number in 0..blocks.len() {
         let block = number as u32;
-        for position in positions(number) {
-            if !others.iter().any(|other| holds(other, &position)) {
-                continue;
-            }
+        for position in positions(number).filter(|&position| cells.has_several(position)) {
             let key = key(position);
             let [first, last] = users.entry(key).or_insert([block; 2]);
             if *last != block {
@@ -82,6 +79,45 @@ pub fn each_shared<P>(
                 found(key, *first as usize, number);
             }
         }
+    }
+}
+
+/// Which cells of a grid have positions of several blocks. Different cells may share a slot: then one of
+/// them may seem to have several.
+struct CellUsers {
+    low: [f64; 3],
+    side: f64,
+    /// The one block of each slot, [`NO_BLOCK`] or [`SEVERAL`]. The length is a power of two.
+    slots: Vec<u32>,
+}
+
+const NO_BLOCK: u32 = u32::MAX;
+const SEVERAL: u32 = u32::MAX - 1;
+
+impl CellUsers {
+    /// For so many positions within bounds: about as many cells on the ground as there are positions.
+    fn new((low, high): Bounds, positions: usize) -> Self {
+        let longest = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+        let side = (longest / (positions as f64).sqrt()).max(f64::MIN_POSITIVE);
+        Self { low, side, slots: vec![NO_BLOCK; positions.next_power_of_two()] }
+    }
+
+    fn slot(&self, position: [f64; 3]) -> usize {
+        let mut hasher = FxHasher::default();
+        for (at, low) in position.into_iter().zip(self.low) {
+            hasher.write_i64(((at - low) / self.side) as i64);
+        }
+        hasher.finish() as usize & (self.slots.len() - 1)
+    }
+
+    fn add(&mut self, position: [f64; 3], block: u32) {
+        let slot = self.slot(position);
+        let user = &mut self.slots[slot];
+        *user = if [NO_BLOCK, block].contains(user) { block } else { SEVERAL };
+    }
+
+    fn has_several(&self, position: [f64; 3]) -> bool {
+        self.slots[self.slot(position)] == SEVERAL
     }
 }
 
@@ -158,6 +194,7 @@ mod tests {
     use super::*;
     use crate::builder::border::vertex::BorderVertexState;
     use crate::mesh::Mesh;
+    use crate::random::Random;
 
     #[test]
     fn only_positions_of_two_blocks_are_shared_and_they_are_kept_at_every_level() {
@@ -180,5 +217,41 @@ mod tests {
             [state(1, 0), state(1, 9), state(0, 0)],
             [BorderVertexState::Kept, BorderVertexState::Kept, BorderVertexState::Free]
         );
+    }
+
+    #[test]
+    fn shared_positions_are_those_of_a_slow_count_however_blocks_overlap() {
+        let mut random = Random::new(7, 0);
+        for spread in [0.0, 4.0, 1e9] {
+            let blocks: Vec<Vec<[f64; 3]>> = (0..40)
+                .map(|block| {
+                    let corner = f64::from(block) * spread;
+                    let mut at = || corner + (random.unit() * 12.0).floor();
+                    (0..30).map(|_| [at(), at(), at()]).collect()
+                })
+                .collect();
+            let bounds: Vec<Bounds> =
+                blocks.iter().map(|block| bounds_of(block.iter().copied())).collect();
+            let found = shared_positions(&bounds, |block| blocks[block].iter().copied());
+            let users = |at: [f64; 3]| blocks.iter().filter(|block| block.contains(&at)).count();
+            let all = blocks.iter().flatten().copied();
+            let expected: FxHashSet<_> = all.filter(|&at| users(at) > 1).map(key).collect();
+            assert_eq!(found, expected, "{spread}");
+        }
+    }
+
+    #[test]
+    fn each_position_is_looked_at_three_times_however_many_blocks_there_are() {
+        for blocks in [10, 160] {
+            let looked = std::cell::Cell::new(0);
+            let bounds = vec![([0.0; 3], [9.0; 3]); blocks];
+            let positions = |block: usize| {
+                (0..10).map(move |at| [f64::from(at), block as f64, 0.0]).inspect(|_| {
+                    looked.set(looked.get() + 1);
+                })
+            };
+            assert!(shared_positions(&bounds, positions).is_empty());
+            assert!(looked.get() <= 3 * 10 * blocks, "{} of {blocks}", looked.get());
+        }
     }
 }
