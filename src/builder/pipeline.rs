@@ -372,9 +372,11 @@ impl Run<'_> {
         }
         let tilesets = self.stages.time(Stage::Write, || write_tilesets(&scene, self.output))?;
         let mut levels = level_reports(&scene);
+        let mut by_id: Vec<&Node> = scene.nodes.iter().collect();
+        by_id.sort_unstable_by_key(|node| node.id);
         for over in &over_budget {
-            if let Some(node) = scene.nodes.iter().find(|node| node.id == over.id) {
-                levels[node.level as usize].over_budget += 1;
+            if let Ok(at) = by_id.binary_search_by_key(&over.id, |node| node.id) {
+                levels[by_id[at].level as usize].over_budget += 1;
             }
         }
         let seconds = |stage: Stage| self.stages.seconds(stage);

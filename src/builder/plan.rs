@@ -64,18 +64,20 @@ impl Plan {
         let boxes = boxes(all, &known, preparing.sources, subsets, first)?;
         let mut tiles = Tiles::new(all, boxes, preparing.options);
         let is_changed = |place: usize| known[place].is_none();
+        let place_of: BTreeMap<String, usize> =
+            all.iter().map(|path| text_of(path)).zip(0..).collect();
         // One that met an input that is gone, too.
         for (&place, report) in places.iter().zip(&mut still_good) {
             let is_there = |path: &str| {
-                tiles.neighbours(place).iter().any(|&other| text_of(&all[other]) == path)
+                place_of.get(path).is_some_and(|&other| tiles.are_neighbours(place, other))
             };
             report.take_if(|known| {
                 known.bounds.is_none() || !known.meetings.iter().all(|other| is_there(&other.path))
             });
         }
+        let near_changed = tiles.neighbours_of((0..all.len()).filter(|&place| is_changed(place)));
         let in_question = |(&place, report): (&usize, &Option<InputReport>)| {
-            let near_changed = || tiles.neighbours(place).iter().any(|&other| is_changed(other));
-            (report.is_none() || near_changed()).then_some(place)
+            (report.is_none() || near_changed.contains(&place)).then_some(place)
         };
         let in_question: BTreeSet<usize> =
             places.iter().zip(&still_good).filter_map(in_question).collect();
@@ -86,10 +88,10 @@ impl Plan {
         let is_small = all.iter().map(bytes).sum::<u64>() <= memory / KEPT;
         let keep = is_small && !preparing.options.resume;
         let mut prepared: BTreeMap<PathBuf, Prepared> = BTreeMap::new();
-        tiles.read_rims(in_question.iter().copied(), |place, rim| {
+        tiles.read_rims(&in_question, |place, rim| {
             progress.comparing(&all[place]);
             let read = preparing.read(&all[place])?;
-            let rim = rim(&read.model);
+            let rim = preparing.stages.time(Stage::Gather, || rim(&read.model));
             if keep && is_changed(place) {
                 prepared.insert(all[place].clone(), read);
             }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use crate::Result;
 use crate::builder::block::BuiltBlock;
@@ -25,6 +26,16 @@ pub struct Earlier {
     pub report: BuildReport,
     /// True where its tileset is whole, and for the same place.
     pub tileset: bool,
+    /// The report of each input, by path.
+    input_of: FxHashMap<String, usize>,
+    /// The roots of each input's blocks, by path, in the scene's order.
+    roots_of: FxHashMap<String, Vec<u32>>,
+    /// The reports of districts, by file.
+    district_of: FxHashMap<String, usize>,
+    /// Nodes, by file.
+    node_of: FxHashMap<String, u32>,
+    /// Entries of the report on nodes over their budget, by id.
+    over_budget_of: FxHashMap<u64, usize>,
 }
 
 fn is_as_written(dir: &Path, file: &FileReport) -> bool {
@@ -64,7 +75,27 @@ impl Earlier {
         let tileset = !report.tilesets.is_empty()
             && report.parameters == *parameters
             && report.tilesets.par_iter().all(|file| is_as_written(dir, file));
-        Some(Self { dir: dir.to_path_buf(), scene, report, tileset })
+        let mut roots_of: FxHashMap<String, Vec<u32>> = FxHashMap::default();
+        for root in scene.block_roots() {
+            if let Some(block) = scene.nodes[root as usize].block {
+                let input = scene.blocks[block as usize].input.clone();
+                roots_of.entry(input).or_default().push(root);
+            }
+        }
+        let inputs = report.inputs.iter().map(|input| input.path.clone());
+        let districts = report.districts.iter().map(|district| district.file.clone());
+        let nodes = scene.nodes.iter().map(|node| node.file.clone());
+        Some(Self {
+            dir: dir.to_path_buf(),
+            input_of: inputs.zip(0..).collect(),
+            roots_of,
+            district_of: districts.zip(0..).collect(),
+            node_of: nodes.zip(0..).collect(),
+            over_budget_of: report.over_budget.iter().map(|over| over.id).zip(0..).collect(),
+            scene,
+            report,
+            tileset,
+        })
     }
 
     /// Whether it is what a build that was stopped had finished: every whole result has levels.
@@ -74,7 +105,7 @@ impl Earlier {
 
     /// What it knows of an input.
     pub fn input(&self, path: &str) -> Option<&InputReport> {
-        self.report.inputs.iter().find(|input| input.path == path)
+        self.input_of.get(path).map(|&at| &self.report.inputs[at])
     }
 
     /// Links the files of an input's blocks into the new output.
@@ -82,12 +113,9 @@ impl Earlier {
         let mut taken = Taken { blocks: Vec::new(), shared_textures: BTreeMap::new() };
         // A block may have several roots, which may be in different districts.
         let mut blocks: BTreeMap<u32, BuiltBlock> = BTreeMap::new();
-        for root in self.scene.block_roots() {
+        for &root in self.roots_of.get(&input.path).into_iter().flatten() {
             let Some(block) = self.scene.nodes[root as usize].block else { continue };
             let info = &self.scene.blocks[block as usize];
-            if info.input != input.path {
-                continue;
-            }
             let tree = self.tree(root, output, &mut taken)?;
             let built = blocks.entry(block);
             let new = || BuiltBlock { info: info.clone(), trees: Vec::new() };
@@ -124,11 +152,13 @@ impl Earlier {
         district: &DistrictReport,
         output: &OutputDir,
     ) -> Result<Option<(NodeRecord, BTreeMap<String, SharedTexture>)>> {
-        let known = self.report.districts.contains(district);
-        let node = self.scene.nodes.iter().position(|node| node.file == district.file);
-        let Some(index) = node.filter(|_| known) else { return Ok(None) };
+        let known = self.district_of.get(&district.file).map(|&at| &self.report.districts[at]);
+        let Some(&index) = self.node_of.get(&district.file).filter(|_| known == Some(district))
+        else {
+            return Ok(None);
+        };
         let mut taken = Taken { blocks: Vec::new(), shared_textures: BTreeMap::new() };
-        let record = self.record(index as u32, output, &mut taken)?;
+        let record = self.record(index, output, &mut taken)?;
         Ok(Some((record, taken.shared_textures)))
     }
 
@@ -154,7 +184,7 @@ impl Earlier {
             ));
             taken.shared_textures.insert(texture.file_name.clone(), texture.clone());
         }
-        let over = self.report.over_budget.iter().find(|over| over.id == node.id);
+        let over = self.over_budget_of.get(&node.id).map(|&at| &self.report.over_budget[at]);
         // In order of id.
         let baked = self.report.baked.binary_search_by_key(&node.id, |baked| baked.id);
         let baked = baked.ok().map(|place| &self.report.baked[place]);

@@ -1,6 +1,7 @@
 //! What the build side works on: imported [`Model`]s, [`Material`]s, and the [`Mesh`] of a block, a
 //! chunk or a node.
 
+pub mod box_tree;
 mod coordinate;
 mod disjoint_set;
 mod material;

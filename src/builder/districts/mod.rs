@@ -51,6 +51,7 @@ use crate::builder::threads::in_parallel;
 use crate::format::rims::{KnownRim, RIMS_FILE, Rims};
 use crate::format::{OutputDir, SharedTexture};
 use crate::lattice::Lattice;
+use crate::mesh::box_tree::BoxTree;
 use crate::mesh::{Model, NEAR, UpAxis, Warnings};
 use crate::report::build_report::{BlockCut, DistrictReport};
 use crate::texture::{SharedTextures, TextureCache};
@@ -193,13 +194,16 @@ impl Level<'_> {
         for (district, group) in found.iter().enumerate() {
             group.iter().for_each(|&member| district_of[member] = district);
         }
+        let by_place = BoxTree::new(boxes.iter().map(|&(low, high)| [low, high]).collect());
         let mut trees: Vec<Option<Tree<NodeRecord>>> = trees.into_iter().map(Some).collect();
         let mut plan = |(district, group): (usize, Vec<usize>)| {
             let own: Vec<Bounds> = group.iter().map(|&member| boxes[member]).collect();
             let around = bounds_of(own.iter().flat_map(|&(low, high)| [low, high]));
-            let others = boxes.iter().zip(&district_of).filter(|(_, of)| **of != district);
-            let others = others.map(|(other, _)| *other);
-            let others = others.filter(|other| meet(&around, other)).collect();
+            let meeting = by_place.matching(|&[low, high]| meet(&around, &(low, high)));
+            let mut others: Vec<usize> =
+                meeting.filter(|&other| district_of[other] != district).collect();
+            others.sort_unstable();
+            let others = others.into_iter().map(|other| boxes[other]).collect();
             let members: Vec<Tree<NodeRecord>> =
                 group.into_iter().filter_map(|member| trees[member].take()).collect();
             Planned { file: file_of(&members), members, own, around, others }

@@ -382,10 +382,9 @@ mod tests {
     }
 
     fn rim(model: &Model) -> Rim {
-        let everywhere = [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]];
         let mut options = BuildOptions::default();
         options.hierarchy.desired_tris = 100;
-        Rim::new(model, &[everywhere], NEAR, &options)
+        Rim::new(model, |_| true, &options)
     }
 
     fn between(models: [&Model; 2], thirds: &[&Model]) -> [Share; 2] {

@@ -10,6 +10,15 @@ use crate::mesh::Model;
 /// Least and greatest coordinates.
 pub type BoundingBox = [[f64; 3]; 2];
 
+/// Whether a box is within `distance` of another on every axis, all of it.
+pub fn is_within(
+    [low, high]: &BoundingBox,
+    [other_low, other_high]: &BoundingBox,
+    distance: f64,
+) -> bool {
+    (0..3).all(|i| high[i] <= other_high[i] + distance && other_low[i] <= low[i] + distance)
+}
+
 /// Whether two boxes come within `distance` of each other on every axis.
 pub fn come_near(
     [low, high]: &BoundingBox,
@@ -40,15 +49,18 @@ pub struct Keep {
 }
 
 impl Rim {
-    /// Of a model, where it is within `distance` of one of some boxes.
+    /// Of a model, as far as the box around an edge `is_near` others.
     pub fn new(
         model: &Model,
-        others: &[BoundingBox],
-        distance: f64,
+        is_near: impl Fn(&BoundingBox) -> bool,
         options: &BuildOptions,
     ) -> Self {
         let mut edges = open_edges(&model.parts);
-        edges.retain(|edge| others.iter().any(|other| is_near(edge, other, distance)));
+        edges.retain(|edge| {
+            let [a, b] = edge.ends;
+            let axes = [0, 1, 2];
+            is_near(&[axes.map(|i| a[i].min(b[i])), axes.map(|i| a[i].max(b[i]))])
+        });
         edges.shrink_to_fit();
         Self { bounds: model.bounds(), edges, keeps: keeps(model, options) }
     }
