@@ -26,7 +26,7 @@ pub mod tiling;
 mod tokens;
 mod vertices;
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
 
@@ -94,18 +94,35 @@ fn assemble(mut model: Model) -> Result<Model> {
     }
     model.dependencies.sort();
     model.dependencies.dedup();
-    let mut names = BTreeSet::new();
-    for material in &mut model.materials {
-        let given = if material.name.is_empty() { "default" } else { &material.name };
-        let mut name = given.to_owned();
-        let mut number = 2;
-        while !names.insert(name.clone()) {
-            name = format!("{given}.{number}");
-            number += 1;
+    number_equal_names(&mut model.materials);
+    Ok(model)
+}
+
+/// Gives materials different names: the first of a name keeps it, others get the least number behind
+/// it that is free.
+fn number_equal_names(materials: &mut [Material]) {
+    // Each name with the least number that may be free behind it.
+    let mut names: BTreeMap<String, u64> = BTreeMap::new();
+    for material in materials {
+        let given = match material.name.is_empty() {
+            true => "default".to_owned(),
+            false => std::mem::take(&mut material.name),
+        };
+        let mut name = given.clone();
+        if let Some(&first) = names.get(&given) {
+            let mut number = first;
+            name = loop {
+                let numbered = format!("{given}.{number}");
+                number += 1;
+                if !names.contains_key(&numbered) {
+                    break numbered;
+                }
+            };
+            names.insert(given, number);
         }
+        names.insert(name.clone(), 2);
         material.name = name;
     }
-    Ok(model)
 }
 
 /// True where some triangle is higher than its corners' last bits. Looks no further than that.

@@ -1,10 +1,12 @@
 //! Checks on whole models, and the real data where it is present.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use super::*;
 use crate::decode::{decode_texture, texture_size};
 use crate::mesh::{AlphaMode, Part};
+use crate::scaling::assert_scales;
 
 /// What every imported model promises.
 pub(super) fn check(model: &Model) {
@@ -159,4 +161,26 @@ fn the_same_scene_as_obj_and_as_gltf() {
     assert!((area(&obj) - 33.0).abs() < 1e-6, "{}", area(&obj));
     assert!((area(&obj) - area(&gltf)).abs() < 1e-3, "{}", area(&gltf));
     assert_eq!(obj.parts[0].texcoords[0], gltf.parts[0].texcoords[0]);
+}
+
+#[test]
+fn materials_of_one_name_are_numbered() {
+    let names = |given: &[&str]| -> Vec<String> {
+        let mut materials: Vec<Material> =
+            given.iter().map(|name| Material::plain(*name)).collect();
+        number_equal_names(&mut materials);
+        materials.into_iter().map(|material| material.name).collect()
+    };
+    assert_eq!(names(&["a", "b", "a", "a"]), ["a", "b", "a.2", "a.3"]);
+    assert_eq!(
+        names(&["a.2", "a", "a", "a.2", "a.3", "a"]),
+        ["a.2", "a", "a.3", "a.2.2", "a.3.2", "a.4"]
+    );
+    assert_eq!(names(&["", "default", ""]), ["default", "default.2", "default.3"]);
+}
+
+#[test]
+fn numbering_scales_with_the_number_of_materials() {
+    let of_one_name = |count: usize| vec![Material::plain("facade"); count];
+    assert_scales(1000, of_one_name, |mut materials| number_equal_names(&mut materials));
 }

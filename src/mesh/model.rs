@@ -1,5 +1,6 @@
 //! An input file in memory: f64 positions, faces already triangulated, nothing welded or cut.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use glam::DVec3;
@@ -65,7 +66,15 @@ pub struct Part {
 /// What was imperfect in an input and how often, in the order in which it was first met.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Warnings {
-    entries: Vec<(String, u64)>,
+    /// By text.
+    entries: BTreeMap<String, Warning>,
+}
+
+/// A warning's place in the order in which texts were first met, and how often it applies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Warning {
+    place: usize,
+    count: u64,
 }
 
 impl Warnings {
@@ -74,23 +83,25 @@ impl Warnings {
         if times == 0 {
             return;
         }
-        let what = what.into();
-        match self.entries.iter_mut().find(|(text, _)| *text == what) {
-            Some((_, count)) => *count += times,
-            None => self.entries.push((what, times)),
-        }
+        let new = Warning { place: self.entries.len(), count: 0 };
+        self.entries.entry(what.into()).or_insert(new).count += times;
     }
 
     /// Takes over all of `other`.
     pub fn extend(&mut self, other: Warnings) {
-        for (what, times) in other.entries {
-            self.add(what, times);
+        let mut entries: Vec<(String, Warning)> = other.entries.into_iter().collect();
+        entries.sort_by_key(|(_, warning)| warning.place);
+        for (what, Warning { count, .. }) in entries {
+            self.add(what, count);
         }
     }
 
     /// Text and count of each.
     pub fn iter(&self) -> impl Iterator<Item = (&str, u64)> {
-        self.entries.iter().map(|(what, times)| (what.as_str(), *times))
+        let mut entries: Vec<(&str, Warning)> =
+            self.entries.iter().map(|(what, warning)| (what.as_str(), *warning)).collect();
+        entries.sort_by_key(|(_, warning)| warning.place);
+        entries.into_iter().map(|(what, Warning { count, .. })| (what, count))
     }
 
     /// True where nothing was imperfect.
@@ -150,5 +161,34 @@ impl Model {
     /// The number of triangles in all parts.
     pub fn triangle_count(&self) -> usize {
         self.parts.iter().map(|part| part.indices.len() / 3).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scaling::assert_scales;
+
+    #[test]
+    fn warnings_keep_the_order_in_which_they_were_met() {
+        let mut warnings = Warnings::default();
+        for (what, times) in [("b", 1), ("c", 0), ("a", 2), ("b", 3)] {
+            warnings.add(what, times);
+        }
+        let mut other = Warnings::default();
+        other.add("d", 1);
+        other.add("a", 1);
+        warnings.extend(other);
+        assert_eq!(warnings.iter().collect::<Vec<_>>(), [("b", 4), ("a", 3), ("d", 1)]);
+    }
+
+    #[test]
+    fn time_scales_with_the_number_of_warnings() {
+        let texts = |count: usize| (0..count).map(|at| format!("texture {at} not found")).collect();
+        assert_scales(2000, texts, |texts: Vec<String>| {
+            let mut warnings = Warnings::default();
+            texts.into_iter().for_each(|text| warnings.add(text, 1));
+            warnings
+        });
     }
 }

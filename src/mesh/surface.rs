@@ -21,8 +21,12 @@ use crate::stage_timer::StageTimer;
 /// that of the box's corner, along three axes.
 const BOX_SLACK: f64 = 4.0 / (1 << 23) as f64;
 
-/// Side of the squares, metres.
+/// Least side of the squares, metres.
 const SQUARE: f64 = 8192.0;
+
+/// Least side of the squares, in sizes of the median triangle: what is in millimetres would have
+/// a square for each triangle.
+const SQUARE_TRIANGLES: f64 = 1024.0;
 
 /// What lowers the reach of a search to this has found enough.
 const ENOUGH: f64 = -1.0;
@@ -91,10 +95,22 @@ impl Surface {
 
     /// The same with hierarchies of at most so many triangles.
     fn in_parts(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, most: usize) -> Self {
+        let size = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|vertex| positions[vertex as usize]);
+            (a.max(b).max(c) - a.min(b).min(c)).max_element()
+        };
+        let mut sizes: Vec<f64> = triangles.iter().map(size).collect();
+        let middle = sizes.len() / 2;
+        let median = match sizes.is_empty() {
+            true => 0.0,
+            false => *sizes.select_nth_unstable_by(middle, f64::total_cmp).1,
+        };
+        drop(sizes);
+        let side = SQUARE.max(SQUARE_TRIANGLES * median);
         let mut squares: BTreeMap<[i64; 3], Vec<u32>> = BTreeMap::new();
         for (number, triangle) in (0..).zip(&triangles) {
             let corner = positions[triangle[0] as usize];
-            let square = (corner / SQUARE).floor().to_array().map(|side| side as i64);
+            let square = (corner / side).floor().to_array().map(|at| at as i64);
             squares.entry(square).or_default().push(number);
         }
         let mut parts = Vec::new();
@@ -480,6 +496,15 @@ mod tests {
             let point = at + DVec3::new(3.0, 40.0, -7.0);
             assert_eq!(both.distance(point), alone.distance(point));
         }
+    }
+
+    #[test]
+    fn a_model_in_millimetres_has_few_parts() {
+        let corner = |at: usize| DVec3::new((at % 100) as f64, (at / 100) as f64, 0.0) * 2e4;
+        let triangle = |at: usize| [DVec3::ZERO, DVec3::X, DVec3::Y].map(|p| corner(at) + p * 1e4);
+        let positions: Vec<DVec3> = (0..10_000).flat_map(triangle).collect();
+        let triangles = (0..10_000).map(|at| [0, 1, 2].map(|corner| 3 * at + corner)).collect();
+        assert!(Surface::new(positions, triangles).parts.len() <= 4);
     }
 
     #[test]
