@@ -11,7 +11,7 @@ use gltf_json::{Index, Root};
 use serde_json::Value;
 
 use super::clean::{CleanStats, clean};
-use super::gltf_buffers::{Buffers, container};
+use super::gltf_buffers::{Buffers, Vectors, container};
 use super::gltf_materials::{GltfMaterial, Materials, texture_images};
 use super::gltf_meshopt::Compression;
 use super::gltf_nodes::{InstanceAccessors, Placement, placements, unit_quaternion};
@@ -104,6 +104,7 @@ fn read(path: &Path, bytes: &[u8]) -> Result<Model, String> {
         material_of_index: BTreeMap::new(),
         groups: Vec::new(),
         parts: Vec::new(),
+        numbers: Vec::new(),
     };
     for placement in &placements {
         scene.add(placement).map_err(|what| format!("node {}: {what}", placement.node))?;
@@ -192,6 +193,8 @@ struct Scene<'a> {
     material_of_index: BTreeMap<Option<usize>, u32>,
     groups: Vec<Group>,
     parts: Vec<Part>,
+    /// See [`compact`].
+    numbers: Vec<u32>,
 }
 
 /// A primitive's triangles in the coordinates of its mesh.
@@ -215,6 +218,8 @@ impl Scene<'_> {
             .ok_or_else(|| format!("there is no mesh {}", placement.mesh))?;
         let transforms = self.transforms(placement)?;
         let mut instances: Vec<Vec<Part>> = vec![Vec::new(); transforms.len()];
+        // By material; the same of all instances.
+        let mut part_of: BTreeMap<u32, usize> = BTreeMap::new();
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let in_primitive =
                 |what| format!("mesh {}, primitive {number}: {what}", placement.mesh);
@@ -226,12 +231,12 @@ impl Scene<'_> {
             let Some(decoded) = self.decode(primitive, material).map_err(in_primitive)? else {
                 continue;
             };
+            let next = part_of.len();
+            let at = *part_of.entry(material).or_insert(next);
             for (parts, world) in instances.iter_mut().zip(&transforms) {
-                let at = parts.iter().position(|part| part.material == material);
-                let at = at.unwrap_or_else(|| {
+                if at == parts.len() {
                     parts.push(Part { material, ..Part::default() });
-                    parts.len() - 1
-                });
+                }
                 append(&mut parts[at], &decoded, world).map_err(in_primitive)?;
             }
         }
@@ -322,7 +327,7 @@ impl Scene<'_> {
             self.stats.not_triangles += 1;
             return Ok(None);
         }
-        let positions: Vec<[f64; 3]> = self.buffers.vectors(position_accessor)?;
+        let positions = self.buffers.vector_elements::<3>(position_accessor)?;
         let count = positions.len();
         let corners = match primitive.indices {
             Some(accessor) => self.buffers.indices(accessor)?,
@@ -332,15 +337,16 @@ impl Scene<'_> {
             return Err(format!("vertex index {index} of {count}"));
         }
         let made = &self.materials[material as usize];
-        let texcoords: Option<Vec<[f64; 2]>> = match made.material.texture {
+        let texcoords = match made.material.texture {
             Some(_) => attribute(Semantic::TexCoords(made.texcoord_set))
-                .map(|accessor| self.buffers.vectors(accessor))
+                .map(|accessor| self.buffers.vector_elements::<2>(accessor))
                 .transpose()?,
             None => None,
         };
         let colors =
-            attribute(Semantic::Colors(0)).map(|accessor| self.colors(accessor)).transpose()?;
-        for length in [texcoords.as_ref().map(Vec::len), colors.as_ref().map(Vec::len)] {
+            attribute(Semantic::Colors(0)).map(|at| Colors::new(&self.buffers, at)).transpose()?;
+        let lengths = [texcoords.as_ref().map(Vectors::len), colors.as_ref().map(Colors::len)];
+        for length in lengths {
             if length.is_some_and(|length| length != count) {
                 return Err(format!(
                     "{count} positions, but {} texture coordinates or colours",
@@ -361,52 +367,75 @@ impl Scene<'_> {
         }
 
         // Only what the triangles use: primitives often share accessors much larger than they.
-        let used = compact(&mut corners);
+        let used = compact(&mut corners, &mut self.numbers);
         let mut texcoord = |vertex: &u32| {
             let Some(texcoords) = &texcoords else { return [0.0; 2] };
-            let uv = made.transform.apply(texcoords[*vertex as usize]);
+            let uv = made.transform.apply(texcoords.get(*vertex as usize));
             let is_finite = uv.iter().all(|value| value.is_finite());
             self.stats.texcoords_not_finite += u64::from(!is_finite);
             if is_finite { uv } else { [0.0; 2] }
         };
         Ok(Some(Decoded {
-            positions: used.iter().map(|vertex| positions[*vertex as usize]).collect(),
+            positions: used.iter().map(|vertex| positions.get(*vertex as usize)).collect(),
             corners,
             texcoords: match textured {
                 true => used.iter().map(&mut texcoord).collect(),
                 false => Vec::new(),
             },
             colors: colors
-                .map(|colors| used.iter().map(|vertex| colors[*vertex as usize]).collect()),
+                .map(|colors| used.iter().map(|vertex| colors.get(*vertex as usize)).collect()),
         }))
-    }
-
-    /// Vertex colours, RGB or RGBA, which glTF gives in linear light.
-    fn colors(&self, accessor: Index<gltf_json::Accessor>) -> Result<Vec<[u16; 4]>, String> {
-        if self.buffers.components(accessor)? == 4 {
-            let colors = self.buffers.vectors::<4>(accessor)?;
-            return Ok(colors.iter().map(|color| color.map(unorm16)).collect());
-        }
-        let colors = self.buffers.vectors::<3>(accessor)?;
-        let opaque = |&[r, g, b]: &[f64; 3]| [r, g, b, 1.0].map(unorm16);
-        Ok(colors.iter().map(opaque).collect())
     }
 }
 
-/// Renumbers the vertices that corners use by their first use; returns their old numbers.
-fn compact(corners: &mut [u32]) -> Vec<u32> {
-    let first = corners.iter().copied().min().unwrap_or(0);
-    let last = corners.iter().copied().max().unwrap_or(0);
-    let mut numbers = vec![NONE; (last - first) as usize + 1];
+/// Vertex colours, which glTF gives in linear light.
+enum Colors<'b> {
+    Rgb(Vectors<'b, 3>),
+    Rgba(Vectors<'b, 4>),
+}
+
+impl<'b> Colors<'b> {
+    fn new(buffers: &'b Buffers, accessor: Index<gltf_json::Accessor>) -> Result<Self, String> {
+        Ok(match buffers.components(accessor)? {
+            4 => Self::Rgba(buffers.vector_elements(accessor)?),
+            _ => Self::Rgb(buffers.vector_elements(accessor)?),
+        })
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::Rgb(colors) => colors.len(),
+            Self::Rgba(colors) => colors.len(),
+        }
+    }
+
+    fn get(&self, at: usize) -> [u16; 4] {
+        let color = match self {
+            Self::Rgb(colors) => {
+                let [r, g, b] = colors.get(at);
+                [r, g, b, 1.0]
+            }
+            Self::Rgba(colors) => colors.get(at),
+        };
+        color.map(unorm16)
+    }
+}
+
+/// Renumbers the vertices that corners use by their first use; returns their old numbers. `numbers` has
+/// [`NONE`] for each vertex before and after, so that it need not be made anew for each primitive.
+fn compact(corners: &mut [u32], numbers: &mut Vec<u32>) -> Vec<u32> {
+    let vertices = corners.iter().max().map_or(0, |last| *last as usize + 1);
+    numbers.resize(vertices.max(numbers.len()), NONE);
     let mut used = Vec::new();
     for corner in corners {
-        let number = &mut numbers[(*corner - first) as usize];
+        let number = &mut numbers[*corner as usize];
         if *number == NONE {
             *number = used.len() as u32;
             used.push(*corner);
         }
         *corner = *number;
     }
+    used.iter().for_each(|vertex| numbers[*vertex as usize] = NONE);
     used
 }
 

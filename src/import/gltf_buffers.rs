@@ -1,7 +1,9 @@
 //! The bytes of a glTF file: container, buffers, views and accessors, every bound checked here.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use base64::Engine;
 use base64::alphabet::STANDARD;
@@ -10,9 +12,11 @@ use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf_json::validation::{Checked, USize64};
 use gltf_json::{Index, Root, buffer};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 use super::gltf_meshopt::{Compressed, Compression};
 use super::paths::Finder;
+use crate::stage_timer::StageTimer;
 
 /// A `.glb` taken apart: its JSON and its binary chunk.
 ///
@@ -117,6 +121,8 @@ pub(super) struct Buffers<'a> {
     bytes: Vec<Cow<'a, [u8]>>,
     /// By buffer view: its bytes, if it was compressed.
     decoded: Vec<Option<Vec<u8>>>,
+    /// Of the sparse accessors that were read.
+    replaced: Mutex<BTreeMap<usize, Arc<Replaced>>>,
 }
 
 impl<'a> Buffers<'a> {
@@ -154,7 +160,7 @@ impl<'a> Buffers<'a> {
             }
             bytes.push(data);
         }
-        let mut buffers = Self { root, bytes, decoded: Vec::new() };
+        let mut buffers = Self { root, bytes, decoded: Vec::new(), replaced: Mutex::default() };
         buffers.decoded = buffers.decode(&compression.views)?;
         Ok(buffers)
     }
@@ -184,7 +190,8 @@ impl<'a> Buffers<'a> {
             };
             decoded.map(Some).map_err(|what| format!("buffer view {number}: {what}"))
         };
-        views.par_iter().enumerate().map(decode).collect()
+        let timer = StageTimer::current();
+        views.par_iter().enumerate().map(|view| timer.time(|| decode(view))).collect()
     }
 
     /// The bytes of a view, its stride not considered.
@@ -212,6 +219,16 @@ impl<'a> Buffers<'a> {
         &self,
         index: Index<gltf_json::Accessor>,
     ) -> Result<Vec<[f64; N]>, String> {
+        let vectors = self.vector_elements(index)?;
+        Ok((0..vectors.len()).map(|at| vectors.get(at)).collect())
+    }
+
+    /// The same, of which none is decoded before it is asked for: many primitives may share an accessor that
+    /// is much larger than what each of them uses.
+    pub(super) fn vector_elements<const N: usize>(
+        &self,
+        index: Index<gltf_json::Accessor>,
+    ) -> Result<Vectors<'_, N>, String> {
         let number = index.value();
         let accessor = self.layout(number)?;
         if accessor.components != N {
@@ -220,13 +237,9 @@ impl<'a> Buffers<'a> {
                 accessor.components
             ));
         }
-        let mut vectors = Vec::new();
-        self.elements(number, &accessor, &mut vectors, |element| {
-            std::array::from_fn(|at| {
-                component(element, at, accessor.component_type, accessor.normalized)
-            })
-        })?;
-        Ok(vectors)
+        let elements = self.elements(number, &accessor)?;
+        let (kind, normalized) = (accessor.component_type, accessor.normalized);
+        Ok(Vectors { elements, kind, normalized })
     }
 
     /// The number of components of an accessor's elements.
@@ -242,64 +255,79 @@ impl<'a> Buffers<'a> {
         if accessor.components != 1 || !is_unsigned(kind) {
             return Err(format!("accessor {number} holds no indices; expected unsigned scalars"));
         }
-        let mut indices = Vec::new();
-        self.elements(number, &accessor, &mut indices, |element| unsigned(element, kind))?;
-        Ok(indices)
+        let elements = self.elements(number, &accessor)?;
+        let index = |at: usize| elements.get(at).map_or(0, |element| unsigned(element, kind));
+        Ok((0..accessor.count).map(index).collect())
     }
 
-    /// Decodes every element of an accessor, those that `sparse` replaces included.
-    fn elements<T: Copy + bytemuck::Zeroable>(
-        &self,
-        number: usize,
-        accessor: &Layout,
-        out: &mut Vec<T>,
-        decode: impl Fn(&[u8]) -> T,
-    ) -> Result<(), String> {
-        let size = accessor.size();
+    /// The bytes of an accessor's elements, those that `sparse` replaces included.
+    fn elements(&self, number: usize, accessor: &Layout) -> Result<Elements<'_>, String> {
+        let (size, count) = (accessor.size(), accessor.count);
+        let mut elements = Elements {
+            bytes: None,
+            stride: size,
+            size,
+            count,
+            replaced: Arc::default(),
+            values: &[],
+        };
         match accessor.json.buffer_view {
             Some(view) => {
-                let stride = self.root.buffer_views[view.value()]
-                    .byte_stride
-                    .map_or(size, |stride| stride.0);
+                if let Some(stride) = self.root.buffer_views[view.value()].byte_stride {
+                    elements.stride = stride.0;
+                }
                 let offset = accessor.json.byte_offset.unwrap_or_default();
-                let bytes = self.strided(number, view, offset, accessor.count, stride, size)?;
-                out.reserve_exact(accessor.count);
-                out.extend((0..accessor.count).map(|at| decode(&bytes[at * stride..][..size])));
+                let bytes = self.strided(number, view, offset, count, elements.stride, size)?;
+                elements.bytes = Some(bytes);
             }
             None => {
                 // All zero. No element without a byte somewhere, so that no count is believed.
                 let held: usize = self.bytes.iter().map(|bytes| bytes.len()).sum();
-                if accessor.json.sparse.is_none() || accessor.count > held {
+                if accessor.json.sparse.is_none() || count > held {
                     return Err(format!("accessor {number} has no data"));
                 }
-                out.resize(accessor.count, T::zeroed());
             }
         }
-        let Some(sparse) = &accessor.json.sparse else { return Ok(()) };
+        if let Some(sparse) = &accessor.json.sparse {
+            let (values, replacing) = (&sparse.values, sparse.count.0 as usize);
+            let offset = values.byte_offset;
+            elements.values =
+                self.strided(number, values.buffer_view, offset, replacing, size, size)?;
+            elements.replaced = self.replaced(number, sparse, count)?;
+        }
+        Ok(elements)
+    }
+
+    /// The place among the values of each element that `sparse` replaces: the last, where there are
+    /// several. Found once for each accessor.
+    fn replaced(
+        &self,
+        number: usize,
+        sparse: &gltf_json::accessor::sparse::Sparse,
+        elements: usize,
+    ) -> Result<Arc<Replaced>, String> {
+        let mut known = self.replaced.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(replaced) = known.get(&number) {
+            return Ok(Arc::clone(replaced));
+        }
         let Checked::Valid(index_type) = sparse.indices.component_type else {
             return Err(format!("accessor {number}: unknown type of sparse indices"));
         };
-        let count = sparse.count.0 as usize;
-        let index_size = index_type.0.size();
-        let (indices, values) = (&sparse.indices, &sparse.values);
-        let places = self.strided(
-            number,
-            indices.buffer_view,
-            indices.byte_offset,
-            count,
-            index_size,
-            index_size,
-        )?;
-        let values =
-            self.strided(number, values.buffer_view, values.byte_offset, count, size, size)?;
+        let (indices, count) = (&sparse.indices, sparse.count.0 as usize);
+        let size = index_type.0.size();
+        let bytes =
+            self.strided(number, indices.buffer_view, indices.byte_offset, count, size, size)?;
+        let mut replaced = Replaced::default();
         for at in 0..count {
-            let index = unsigned(&places[at * index_size..][..index_size], index_type.0);
-            let slot = out.get_mut(index as usize).ok_or_else(|| {
-                format!("accessor {number}: sparse index {index} of {}", accessor.count)
-            })?;
-            *slot = decode(&values[at * size..][..size]);
+            let index = unsigned(&bytes[at * size..][..size], index_type.0);
+            if index as usize >= elements {
+                return Err(format!("accessor {number}: sparse index {index} of {elements}"));
+            }
+            replaced.insert(index, at);
         }
-        Ok(())
+        let replaced = Arc::new(replaced);
+        known.insert(number, Arc::clone(&replaced));
+        Ok(replaced)
     }
 
     /// The bytes of a view from `offset` in which `count` elements lie `stride` apart.
@@ -356,6 +384,56 @@ impl<'a> Buffers<'a> {
         }
         let count = usize::try_from(json.count.0).unwrap_or(usize::MAX);
         Ok(Layout { json, component_type, components, count, normalized: json.normalized })
+    }
+}
+
+/// By element, its place among the values that `sparse` gives.
+type Replaced = FxHashMap<u32, usize>;
+
+/// The bytes of an accessor's elements.
+struct Elements<'b> {
+    /// `None` where all are zero.
+    bytes: Option<&'b [u8]>,
+    stride: usize,
+    size: usize,
+    count: usize,
+    replaced: Arc<Replaced>,
+    values: &'b [u8],
+}
+
+impl Elements<'_> {
+    /// The bytes of one; `None` where it is zero.
+    #[inline]
+    fn get(&self, at: usize) -> Option<&[u8]> {
+        if !self.replaced.is_empty()
+            && let Some(place) = self.replaced.get(&(at as u32))
+        {
+            return Some(&self.values[place * self.size..][..self.size]);
+        }
+        self.bytes.map(|bytes| &bytes[at * self.stride..][..self.size])
+    }
+}
+
+/// The elements of an accessor of `N` components.
+pub(super) struct Vectors<'b, const N: usize> {
+    elements: Elements<'b>,
+    kind: ComponentType,
+    normalized: bool,
+}
+
+impl<const N: usize> Vectors<'_, N> {
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.elements.count
+    }
+
+    /// One of them, integers scaled where the accessor is normalised.
+    #[inline]
+    pub(super) fn get(&self, at: usize) -> [f64; N] {
+        let element = self.elements.get(at);
+        let component =
+            |at| element.map_or(0.0, |element| component(element, at, self.kind, self.normalized));
+        std::array::from_fn(component)
     }
 }
 

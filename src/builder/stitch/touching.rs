@@ -169,7 +169,7 @@ const MOST_AT_VERTEX: usize = 32;
 
 /// Edges that are looked at around a vertex, of one [`Grid`], at most: where more are, triangles
 /// lie across each other rather than beside each other.
-const MOST_NEAR: usize = 2048;
+const MOST_NEAR: usize = 512;
 
 /// The least side of a cell, in the largest reach: mostly one cell is looked into.
 const SIDE: f64 = 8.0;
@@ -640,8 +640,8 @@ mod tests {
         let spokes = |count: usize| {
             around(count, |_, [x, y, z]| [[0.0; 3], [x, y, z], [x, y, z + 10.0 / count as f64]])
         };
-        assert_scales(500, book, |part| between(&[part]));
-        assert_scales(500, spokes, |part| between(&[part]));
+        assert_scales(150, book, |part| between(&[part]));
+        assert_scales(150, spokes, |part| between(&[part]));
     }
 
     #[test]
@@ -652,7 +652,7 @@ mod tests {
                 [[0.0, 0.0, z], [10.0, z, z], [z, 10.0, z]]
             })
         };
-        assert_scales(500, pile, |part| between(&[part]));
+        assert_scales(100, pile, |part| between(&[part]));
     }
 
     #[test]

@@ -737,3 +737,50 @@ fn skirts_of_nodes_are_left_out() {
     json["meshes"][0]["primitives"][0]["extras"] = json!({"skirtTriangles": u64::MAX});
     assert!(read_glb(&json, &binary).unwrap_err().contains("no triangle in any mesh"));
 }
+
+/// Triangles of a strip, a primitive each, whose positions are all in one accessor.
+fn shared_accessor(primitives: u32) -> (Value, Vec<u8>) {
+    let mut binary = Vec::new();
+    for vertex in 0..primitives + 2 {
+        let position = [vertex as f32, (vertex % 2) as f32, 0.0];
+        position.iter().for_each(|value| binary.extend(value.to_le_bytes()));
+    }
+    let positions = binary.len();
+    let corners = (0..primitives).flat_map(|first| [first, first + 1, first + 2]);
+    corners.for_each(|corner| binary.extend(corner.to_le_bytes()));
+    let indices = |at: u32| json!({"bufferView": 1, "byteOffset": 12 * at, "componentType": 5125, "count": 3, "type": "SCALAR"});
+    let vertices = primitives + 2;
+    let mut accessors =
+        vec![json!({"bufferView": 0, "componentType": 5126, "count": vertices, "type": "VEC3"})];
+    accessors.extend((0..primitives).map(indices));
+    let primitive = |at: u32| json!({"attributes": {"POSITION": 0}, "indices": at + 1});
+    let json = json!({
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": (0..primitives).map(primitive).collect::<Vec<_>>()}],
+        "accessors": accessors,
+        "bufferViews": [
+            {"buffer": 0, "byteLength": positions},
+            {"buffer": 0, "byteOffset": positions, "byteLength": binary.len() - positions}
+        ],
+        "buffers": [{"byteLength": binary.len()}]
+    });
+    (json, binary)
+}
+
+#[test]
+fn time_scales_with_the_primitives_that_share_an_accessor() {
+    crate::scaling::assert_scales(
+        500,
+        |count| shared_accessor(count as u32),
+        |(json, binary)| {
+            let model = read_glb(&json, &binary).unwrap();
+            assert_eq!(
+                model.triangle_count(),
+                json["meshes"][0]["primitives"].as_array().unwrap().len()
+            );
+        },
+    );
+}
