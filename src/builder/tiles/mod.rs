@@ -198,7 +198,7 @@ mod tests {
     #[test]
     fn inputs_with_vertices_near_each_other_touch() {
         let mut random = Random::new(2, 0);
-        let mut vertex = || [0; 3].map(|_| (random.unit() * 40.0 - 20.0) * NEAR);
+        let mut vertex = || [0; 3].map(|_| (random.unit() * 10.0 - 5.0) * NEAR);
         let rims: BTreeMap<usize, Vec<[f64; 3]>> =
             (0..30).map(|input| (input, (0..4).map(|_| vertex()).collect())).collect();
         let found = touching(&rims.iter().map(|(&input, of)| (input, rim(of))).collect());
