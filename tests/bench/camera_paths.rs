@@ -39,7 +39,7 @@ const POSITION: std::ops::Range<usize> = 2..5;
 const FOV: usize = 9;
 
 fn model(place: &Place, path: &str, out: &str) -> assert_cmd::assert::Assert {
-    place.bench(&["out", path, "--clock", "model", "--out", out])
+    place.bench(&["out", path, "-q", "--clock", "model", "--out", out])
 }
 
 #[test]
