@@ -1,4 +1,4 @@
-//! Progress on standard error: a bar on a terminal, a line every twenty seconds elsewhere.
+//! Progress on standard error: a bar on a terminal, a line every half minute elsewhere.
 
 use std::fmt::Write as _;
 use std::io::IsTerminal;
@@ -12,7 +12,7 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, P
 const TICK: Duration = Duration::from_millis(200);
 
 /// Where there is no terminal, a line is printed this often.
-const LINE_EVERY: Duration = Duration::from_secs(20);
+const LINE_EVERY: Duration = Duration::from_secs(30);
 
 /// The progress of a command; ends with it.
 pub struct Progress {
