@@ -8,8 +8,9 @@ use std::borrow::Cow;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use image::{DynamicImage, ImageReader};
+use image::{DynamicImage, GrayImage, ImageReader, RgbImage};
 use tga::Header;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
@@ -87,18 +88,50 @@ pub fn decode_texture(source: &TextureSource) -> Result<DecodedTexture> {
     Ok(with_opacity(image, &mask))
 }
 
-/// Width and height of a texture in texels, from its header alone.
+/// The alpha of the image in `file`, or its luminance where it has no transparency; 255 there where
+/// the image is a colour texture too, whose own alpha channel alone is opacity.
+pub(crate) fn alpha_values(file: &Path, is_own_alpha: bool) -> Result<GrayImage> {
+    let bytes = std::fs::read(file)
+        .map_err(|error| Error::input(file, format!("cannot be read: {error}")))?;
+    let image = decode(&bytes).map_err(|what| Error::input(file, what))?;
+    if is_own_alpha && image.channels == 3 {
+        return Ok(GrayImage::from_pixel(1, 1, image::Luma([255])));
+    }
+    Ok(opacity_of(&image))
+}
+
+/// A BMP of one white texel: the colours of a texture that has opacity alone.
+const WHITE_IMAGE: [u8; 58] = [
+    b'B', b'M', 58, 0, 0, 0, 0, 0, 0, 0, 54, 0, 0, 0, // file header: size, first pixel
+    40, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 24, 0, // 1 x 1, one plane of 24 bits
+    0, 0, 0, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, // not compressed
+    255, 255, 255, 0,
+];
+
+/// The bytes of an image file of one white texel.
+pub(crate) fn white_image() -> Arc<[u8]> {
+    Arc::new(WHITE_IMAGE)
+}
+
+/// Width and height of a texture in texels, from its header and that of its opacity file alone.
 pub fn texture_size(source: &TextureSource) -> Result<(u32, u32)> {
     let file = file_of(source);
     let size = match &source.data {
-        TextureData::File(path) => {
-            let opened = File::open(path)
-                .map_err(|error| Error::input(path, format!("cannot be opened: {error}")))?;
-            size_of(BufReader::new(opened))
+        TextureData::File(path) => size_of_file(path)?,
+        TextureData::Embedded(bytes) => {
+            size_of(Cursor::new(&bytes[..])).map_err(|what| refusal(&file, source, what))?
         }
-        TextureData::Embedded(bytes) => size_of(Cursor::new(&bytes[..])),
     };
-    size.map_err(|what| refusal(&file, source, what))
+    match &source.opacity {
+        Some(opacity) => Ok(combined_size(size, size_of_file(opacity)?)),
+        None => Ok(size),
+    }
+}
+
+fn size_of_file(path: &Path) -> Result<(u32, u32)> {
+    let opened = File::open(path)
+        .map_err(|error| Error::input(path, format!("cannot be opened: {error}")))?;
+    size_of(BufReader::new(opened)).map_err(|what| Error::input(path, what))
 }
 
 /// The file to name in messages.
@@ -225,33 +258,53 @@ fn from_image(image: DynamicImage) -> DecodedTexture {
     DecodedTexture { width, height, channels: 3, pixels: image.into_rgb8().into_raw() }
 }
 
-/// `image` with the alpha of `mask`, or its luminance where it has no alpha, resampled.
-fn with_opacity(image: DecodedTexture, mask: &DecodedTexture) -> DecodedTexture {
-    let (width, height) = (image.width, image.height);
-    let opacity: Vec<u8> = if mask.channels == 4 {
-        mask.pixels.as_chunks::<4>().0.iter().map(|texel| texel[3]).collect()
+/// Alpha, or luminance where the image has no transparency.
+fn opacity_of(image: &DecodedTexture) -> GrayImage {
+    let opacity: Vec<u8> = if image.channels == 4 {
+        image.pixels.as_chunks::<4>().0.iter().map(|texel| texel[3]).collect()
     } else {
         // Rec. 709 weights in 1/256 on the encoded values, as renderers of MTL take the scalar.
         let luminance = |&[r, g, b]: &[u8; 3]| {
             ((54 * u32::from(r) + 183 * u32::from(g) + 19 * u32::from(b) + 128) >> 8) as u8
         };
-        mask.pixels.as_chunks::<3>().0.iter().map(luminance).collect()
+        image.pixels.as_chunks::<3>().0.iter().map(luminance).collect()
     };
-    let opacity = match image::GrayImage::from_raw(mask.width, mask.height, opacity) {
-        Some(image) if (mask.width, mask.height) != (width, height) => {
-            image::imageops::resize(&image, width, height, image::imageops::FilterType::Triangle)
-                .into_raw()
-        }
-        Some(image) => image.into_raw(),
-        None => return image,
-    };
+    GrayImage::from_raw(image.width, image.height, opacity).unwrap_or_default()
+}
+
+/// The size of an image and its opacity map, of these sizes, together: the larger along each side,
+/// so that neither loses detail; that of the image where this is too large.
+fn combined_size(image: (u32, u32), opacity: (u32, u32)) -> (u32, u32) {
+    check_size(image.0.max(opacity.0), image.1.max(opacity.1)).unwrap_or(image)
+}
+
+/// `image` with the alpha of `mask`, or its luminance where it has no alpha, both resampled to their
+/// [`combined_size`].
+fn with_opacity(image: DecodedTexture, mask: &DecodedTexture) -> DecodedTexture {
+    let (width, height) = combined_size((image.width, image.height), (mask.width, mask.height));
+    let opacity = resized(opacity_of(mask), width, height);
+    let colors = RgbImage::from_raw(image.width, image.height, image.into_opaque().pixels);
+    let colors = resized(colors.unwrap_or_default(), width, height).into_raw();
     if opacity.iter().all(|alpha| *alpha == 255) {
-        return image;
+        return DecodedTexture { width, height, channels: 3, pixels: colors };
     }
-    let texels = image.pixels.chunks_exact(usize::from(image.channels));
-    let pixels =
-        texels.zip(opacity).flat_map(|(texel, a)| [texel[0], texel[1], texel[2], a]).collect();
+    let texels = colors.as_chunks::<3>().0.iter().zip(opacity.into_raw());
+    let pixels = texels.flat_map(|(&[r, g, b], a)| [r, g, b, a]).collect();
     DecodedTexture { width, height, channels: 4, pixels }
+}
+
+/// An image in another size, filtered linearly.
+fn resized<P: image::Pixel<Subpixel = u8> + 'static>(
+    image: image::ImageBuffer<P, Vec<u8>>,
+    width: u32,
+    height: u32,
+) -> image::ImageBuffer<P, Vec<u8>> {
+    match image.dimensions() == (width, height) {
+        true => image,
+        false => {
+            image::imageops::resize(&image, width, height, image::imageops::FilterType::Triangle)
+        }
+    }
 }
 
 #[cfg(test)]
@@ -450,19 +503,25 @@ mod tests {
     }
 
     #[test]
-    fn opacity_files_of_another_size_are_resampled() {
+    fn an_image_and_its_opacity_file_get_the_larger_of_their_sizes() {
         let folder = tempfile::tempdir().unwrap();
         let mask = folder.path().join("mask.png");
-        DynamicImage::from(image::GrayImage::from_fn(4, 2, |x, _| {
-            image::Luma([if x < 2 { 0 } else { 255 }])
-        }))
-        .save(&mask)
-        .unwrap();
-        let mut source = embedded(encoded(&two_texels(255), ImageFormat::Png));
-        source.opacity = Some(mask);
-        let image = decode_texture(&source).unwrap();
-        assert_eq!(image.channels, 4);
-        assert!(image.pixels[3] < 64 && image.pixels[7] > 192, "{:?}", image.pixels);
+        for (size, expected) in [((4, 2), (4, 2)), ((1, 1), (2, 1)), ((1, 3), (2, 3))] {
+            DynamicImage::from(image::GrayImage::from_fn(size.0, size.1, |x, _| {
+                image::Luma([if 2 * x < size.0 { 40 } else { 255 }])
+            }))
+            .save(&mask)
+            .unwrap();
+            let mut source = embedded(encoded(&two_texels(255), ImageFormat::Png));
+            source.opacity = Some(mask.clone());
+            let image = decode_texture(&source).unwrap();
+            assert_eq!(texture_size(&source).unwrap(), expected);
+            assert_eq!((image.width, image.height, image.channels), (expected.0, expected.1, 4));
+            let texels = image.pixels.as_chunks::<4>().0;
+            let last = texels[texels.len() - 1];
+            assert_eq!([texels[0][0], last[0]], [0, 200]);
+            assert_eq!([texels[0][3], last[3]], [40, if size.0 == 1 { 40 } else { 255 }]);
+        }
     }
 
     #[test]

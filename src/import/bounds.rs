@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::find::{Kind, kind};
 use super::obj::chunks::Chunks;
+use super::plain_text::PlainText;
 use super::tokens::{number, word};
 use crate::{Error, Result};
 
@@ -48,7 +49,8 @@ pub(super) fn fold_vertices<T: Send>(
     add: impl Fn(T, [f64; 3]) -> T + Sync,
     join: impl Fn(T, T) -> T + Sync + Send,
 ) -> Result<T> {
-    let mut chunks = Chunks::new(Vec::new(), super::open(path)?, CHUNK_BYTES);
+    let PlainText { head, rest } = super::open_text(path)?;
+    let mut chunks = Chunks::new(head, rest, CHUNK_BYTES);
     let mut all = first();
     loop {
         let mut texts: Vec<Vec<u8>> = Vec::new();
@@ -73,7 +75,7 @@ fn vertices(text: &[u8]) -> impl Iterator<Item = [f64; 3]> {
     let vertex = |start: usize| {
         let line = text.get(start..)?;
         let mut rest = &line[line.iter().position(|byte| !matches!(byte, b' ' | b'\t'))?..];
-        if !matches!(rest, [b'v', b' ' | b'\t', ..]) {
+        if !matches!(rest, [b'v' | b'V', b' ' | b'\t', ..]) {
             return None;
         }
         rest = &rest[1..];

@@ -21,7 +21,7 @@ pub(super) struct CleanStats {
     pub(super) untextured_faces: u64,
     /// Texture coordinates that are NaN or infinite.
     pub(super) texcoords_not_finite: u64,
-    /// Vertex colours with a component outside 0–1.
+    /// Vertex colours with a component out of range.
     pub(super) colors_clamped: u64,
     /// Vertices that no face uses.
     pub(super) unused_vertices: u64,
@@ -52,7 +52,7 @@ impl CleanStats {
         add("point, line or free-form element, ignored", self.not_triangles);
         add("textured face without texture coordinates, set to 0", self.untextured_faces);
         add("texture coordinate that is not finite, set to 0", self.texcoords_not_finite);
-        add("vertex colour outside 0 to 1, clamped", self.colors_clamped);
+        add("vertex colour out of range, clamped", self.colors_clamped);
         add("vertex that no face uses, ignored", self.unused_vertices);
     }
 }

@@ -82,9 +82,6 @@ pub(super) fn text(bytes: &[u8]) -> Cow<'_, str> {
 
 /// Why the first bytes of a file are not those of a text file; `None` where they may be.
 pub(super) fn not_text(head: &[u8]) -> Option<&'static str> {
-    if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
-        return Some("is UTF-16 text; expected plain text (save it as UTF-8)");
-    }
     if head.iter().any(|byte| {
         *byte == 0
             || (*byte < 0x20 && !byte.is_ascii_whitespace() && *byte != 0x1a && *byte != 0x0b)
@@ -139,7 +136,6 @@ mod tests {
     #[test]
     fn binaries_are_recognised() {
         assert!(not_text(b"\x7fELF\x02\x01\x01\x00").is_some());
-        assert!(not_text(&[0xff, 0xfe, b'v', 0]).unwrap().contains("UTF-16"));
         assert!(not_text("# façade\r\n\tv 0 0 0".as_bytes()).is_none());
     }
 }

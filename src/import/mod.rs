@@ -17,17 +17,23 @@ mod gltf_nodes;
 mod gltf_unread;
 mod lines;
 mod mtl;
+mod names;
 mod obj;
+mod opacity;
 mod page_uses;
 mod paged;
 mod paths;
+mod plain_text;
+mod texture_statement;
 mod textures;
 pub mod tiling;
 mod tokens;
 mod vertices;
+mod words;
 
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 pub use bounds::bounds;
@@ -35,6 +41,7 @@ pub use find::find_inputs;
 
 use glam::DVec3;
 
+use self::plain_text::PlainText;
 use crate::mesh::{Material, Model, Part, Warnings};
 use crate::{Error, Result};
 
@@ -66,6 +73,24 @@ fn open(path: &Path) -> Result<File> {
             Err(Error::input(path, "is a folder; expected a model file"))
         }
         _ => Ok(file),
+    }
+}
+
+/// Opens an OBJ.
+fn open_text(path: &Path) -> Result<PlainText<'static>> {
+    plain_text(path, open(path)?)
+}
+
+/// The text of the OBJ at `path`, which is in `file`.
+fn plain_text<'a>(path: &Path, file: impl Read + Send + 'a) -> Result<PlainText<'a>> {
+    let text = PlainText::new(file)
+        .map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
+    if text.head.is_empty() {
+        return Err(Error::input(path, "is empty; expected a Wavefront OBJ with faces"));
+    }
+    match lines::not_text(&text.head) {
+        Some(what) => Err(Error::input(path, what)),
+        None => Ok(text),
     }
 }
 

@@ -13,35 +13,38 @@
 //! of the face before, and cannot say in which line an error is.
 
 pub(super) mod chunks;
+pub(super) mod colors;
 mod corners;
 pub(super) mod index_faults;
 pub(super) mod statements;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use encoding_rs::Encoding;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use self::chunks::Chunks;
+use self::colors::{ColorRange, WHITE, make_linear};
 use self::corners::{Run, Triangles};
 use self::index_faults::IndexFaults;
-use self::statements::{Change, MOST_VERTICES, Statements, WHITE};
+use self::statements::{Change, MOST_VERTICES, Statements};
 use super::clean::{CleanStats, clean};
-use super::lines::not_text;
-use super::mtl::{Library, MtlMaterial};
+use super::mtl::{FIRST_TILE, Library, MtlMaterial};
+use super::names::{self, NameSample};
 use super::page_uses::PageUses;
 use super::paged::Paged;
 use super::paths::Finder;
-use super::textures::Textures;
+use super::plain_text::PlainText;
+use super::textures::{OpacityCache, Textures};
 use super::vertices::{Numbered, Unifier};
+use super::words::Words;
 use crate::mesh::{Group, Model, Part, Warnings};
 use crate::stage_timer::StageTimer;
 use crate::{Error, Result};
-
-/// How much is looked at to tell text from other files.
-const HEAD_BYTES: u64 = 1 << 20;
 
 /// Text that one thread parses at a time: it and what is made of it should stay in the cache.
 pub(super) const CHUNK_BYTES: usize = 1 << 18;
@@ -49,25 +52,37 @@ pub(super) const CHUNK_BYTES: usize = 1 << 18;
 /// Chunks of a batch for each thread: enough to keep all busy when some take longer.
 const CHUNKS_PER_THREAD: usize = 4;
 
+/// What is known of a whole file where a part of it is read.
+#[derive(Clone, Default)]
+pub(super) struct FileTraits {
+    /// The likely encoding of names that are not UTF-8.
+    pub(super) encoding: Option<&'static Encoding>,
+    /// Some vertex has a colour.
+    pub(super) has_colors: bool,
+    /// Shared between the parts.
+    pub(super) opacities: OpacityCache,
+}
+
 /// Reads the OBJ at `path` with its material libraries.
 pub(super) fn load(path: &Path) -> Result<Model> {
-    read(path, super::open(path)?, CHUNK_BYTES)
+    read(path, super::open_text(path)?, FileTraits::default(), CHUNK_BYTES)
 }
 
-/// Reads a part of the OBJ at `path`, whose text `reader` has.
-pub(super) fn load_part(path: &Path, reader: impl Read + Send) -> Result<Model> {
-    read(path, reader, CHUNK_BYTES)
+/// Reads a part of the OBJ at `path`, whose text `reader` has, with line feeds alone.
+pub(super) fn load_part(
+    path: &Path,
+    reader: impl Read + Send,
+    traits: FileTraits,
+) -> Result<Model> {
+    let text = PlainText { head: Vec::new(), rest: Box::new(reader) };
+    read(path, text, traits, CHUNK_BYTES)
 }
 
-/// Reads an OBJ from `reader`; what it names is looked for beside `path`.
-fn read(path: &Path, mut reader: impl Read + Send, chunk_bytes: usize) -> Result<Model> {
+/// Reads an OBJ of this text; the files that it names are looked for beside `path`.
+fn read(path: &Path, text: PlainText, traits: FileTraits, chunk_bytes: usize) -> Result<Model> {
     let unreadable = |error| Error::input(path, format!("cannot be read: {error}"));
-    let mut head = text_of(path, &mut reader)?;
-    if head.starts_with(BYTE_ORDER_MARK) {
-        head.drain(..BYTE_ORDER_MARK.len());
-    }
-    let mut chunks = Chunks::new(head, reader, chunk_bytes);
-    let mut obj = Obj::new(path);
+    let mut chunks = Chunks::new(text.head, text.rest, chunk_bytes);
+    let mut obj = Obj::new(path, traits);
     let timer = StageTimer::current();
     let mut batch = Batch::parse(&mut chunks);
     loop {
@@ -85,23 +100,6 @@ fn read(path: &Path, mut reader: impl Read + Send, chunk_bytes: usize) -> Result
         if batch.parsed.is_empty() && ended.is_err() {
             batch.ended = ended;
         }
-    }
-}
-
-/// What some editors begin a text with.
-pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-
-/// The beginning of a file that is text.
-pub(super) fn text_of(path: &Path, reader: &mut impl Read) -> Result<Vec<u8>> {
-    let unreadable = |error| Error::input(path, format!("cannot be read: {error}"));
-    let mut head = Vec::new();
-    reader.take(HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
-    if head.is_empty() {
-        return Err(Error::input(path, "is empty; expected a Wavefront OBJ with faces"));
-    }
-    match not_text(&head) {
-        Some(what) => Err(Error::input(path, what)),
-        None => Ok(head),
     }
 }
 
@@ -149,6 +147,8 @@ struct PartState {
 
 /// A material that a `usemtl` named.
 struct UsedMaterial {
+    /// As the file gives it.
+    name: Vec<u8>,
     material: MtlMaterial,
     /// A library had defined it when it was first used.
     defined: bool,
@@ -157,6 +157,9 @@ struct UsedMaterial {
 /// The state of reading one file.
 struct Obj<'a> {
     path: &'a Path,
+    traits: FileTraits,
+    /// Names that are not UTF-8.
+    sample: NameSample,
     finder: Finder,
     dependencies: Vec<PathBuf>,
     warnings: Warnings,
@@ -164,21 +167,30 @@ struct Obj<'a> {
     index_faults: IndexFaults,
 
     library: Library,
-    libraries_read: usize,
+    /// The files of libraries that were read.
+    libraries: BTreeSet<PathBuf>,
+    /// That of the first name of a library that is not UTF-8 and was found.
+    library_encoding: Option<&'static Encoding>,
     textures: Textures,
     materials: Vec<UsedMaterial>,
-    material_of_name: BTreeMap<String, u32>,
+    material_of_name: BTreeMap<Vec<u8>, u32>,
+    /// The materials of UDIM tiles, by the material that has them and the tile's number.
+    material_of_tile: BTreeMap<(u32, u32), u32>,
+    /// Faces that no UDIM tile holds.
+    faces_across_tiles: u64,
     /// What `usemtl` named last; `None` before the first.
     material: Option<u32>,
 
     positions: Paged<[f64; 3]>,
-    /// Empty until a vertex has a colour, then one per position.
+    /// Empty until a vertex has a colour, then one per position: as in [`colors::Colors`].
     colors: Paged<[u16; 4]>,
+    color_range: ColorRange,
     texcoords: Paged<[f64; 2]>,
 
-    groups: Vec<Group>,
+    /// The names of the groups, as the file gives them.
+    groups: Vec<Vec<u8>>,
     /// What `o` or `g` named last.
-    group_name: String,
+    group_name: Vec<u8>,
     /// The group of that name once it has a face.
     group: Option<u32>,
     parts: Vec<PartState>,
@@ -191,6 +203,17 @@ struct Obj<'a> {
     lines: u64,
 }
 
+/// How far the faces of a chunk have their parts.
+struct Placing {
+    /// The first face without one.
+    first: usize,
+    /// A face, and the number of corners before it.
+    corner_face: usize,
+    corner: usize,
+    /// How many texture coordinates come before the chunk.
+    texcoords_before: usize,
+}
+
 /// A chunk in its place.
 struct Placed {
     statements: Statements,
@@ -200,25 +223,31 @@ struct Placed {
 }
 
 impl<'a> Obj<'a> {
-    fn new(path: &'a Path) -> Self {
+    fn new(path: &'a Path, traits: FileTraits) -> Self {
         Self {
             path,
+            sample: NameSample::default(),
             finder: Finder::new(path),
             dependencies: vec![path.to_path_buf()],
             warnings: Warnings::default(),
             stats: CleanStats::default(),
             index_faults: IndexFaults::default(),
             library: Library::default(),
-            libraries_read: 0,
-            textures: Textures::default(),
+            libraries: BTreeSet::new(),
+            library_encoding: None,
+            textures: Textures::new(traits.opacities.clone()),
+            traits,
             materials: Vec::new(),
             material_of_name: BTreeMap::new(),
+            material_of_tile: BTreeMap::new(),
+            faces_across_tiles: 0,
             material: None,
             positions: Paged::default(),
             colors: Paged::default(),
+            color_range: ColorRange::default(),
             texcoords: Paged::default(),
             groups: Vec::new(),
-            group_name: super::stem(path),
+            group_name: super::stem(path).into_bytes(),
             group: None,
             parts: Vec::new(),
             part_of: FxHashMap::default(),
@@ -264,33 +293,50 @@ impl<'a> Obj<'a> {
         self.index_faults.add(&chunk.index_faults, self.lines);
         self.lines += chunk.lines;
         self.stats.add(&chunk.stats);
-        if self.colors.len() > 0 || !chunk.colors.is_empty() {
-            let missing = before[0] - self.colors.len();
-            self.colors.extend(std::iter::repeat_n(WHITE, missing));
-            let missing = chunk.positions.len() - chunk.colors.len();
-            self.colors.extend(std::mem::take(&mut chunk.colors));
-            self.colors.extend(std::iter::repeat_n(WHITE, missing));
-        }
+        self.add_colors(&mut chunk, before[0]);
         self.positions.extend(std::mem::take(&mut chunk.positions));
         self.texcoords.extend(std::mem::take(&mut chunk.texcoords));
         let mut runs = Vec::with_capacity(chunk.changes.len() + 1);
-        let mut first = 0;
-        let face_count = chunk.faces.len();
+        let mut placing =
+            Placing { first: 0, corner_face: 0, corner: 0, texcoords_before: before[1] };
         for (end, change) in std::mem::take(&mut chunk.changes) {
-            self.run(first..end, &mut runs);
-            first = end;
+            self.run(&chunk, end, &mut placing, &mut runs);
+            self.sample.add(change.name());
             match change {
-                Change::Group(name) => self.start_group(&name),
+                Change::Group(name) => self.start_group(name),
                 Change::Material(name) => self.use_material(&name),
                 Change::Libraries(names) => self.read_libraries(&names),
             }
         }
-        self.run(first..face_count, &mut runs);
+        self.run(&chunk, chunk.faces.len(), &mut placing, &mut runs);
         Ok(Placed { statements: chunk, runs, before })
     }
 
-    /// Appends the run of these faces, if there are any, to `runs`.
-    fn run(&mut self, faces: std::ops::Range<usize>, runs: &mut Vec<Run>) {
+    /// Takes over the colours of a chunk, before which there are so many positions. All become
+    /// linear light where some are.
+    fn add_colors(&mut self, chunk: &mut Statements, before: usize) {
+        if self.colors.len() == 0 && chunk.colors.values.is_empty() {
+            return;
+        }
+        let range = self.color_range.joined(chunk.colors.range);
+        if range.has_fractions {
+            chunk.colors.settle(range);
+            if !self.color_range.has_fractions {
+                self.stats.colors_clamped += make_linear(self.colors.iter_mut(), range);
+            }
+        }
+        self.color_range = range;
+        self.stats.colors_clamped += chunk.colors.clamped;
+        let missing = before - self.colors.len();
+        self.colors.extend(std::iter::repeat_n(WHITE, missing));
+        let missing = chunk.positions.len() - chunk.colors.values.len();
+        self.colors.extend(chunk.colors.values.drain(..));
+        self.colors.extend(std::iter::repeat_n(WHITE, missing));
+    }
+
+    /// Appends the faces of a chunk up to this one, if there are any, to `runs`.
+    fn run(&mut self, chunk: &Statements, end: usize, placing: &mut Placing, runs: &mut Vec<Run>) {
+        let faces = std::mem::replace(&mut placing.first, end)..end;
         if faces.is_empty() {
             return;
         }
@@ -298,10 +344,84 @@ impl<'a> Obj<'a> {
             Some(part) => part,
             None => self.start_part(),
         };
-        let used = &self.materials[self.parts[part as usize].part.material as usize];
+        let material = self.parts[part as usize].part.material;
+        let used = &self.materials[material as usize];
+        if used.material.is_tiled {
+            self.tile_runs(chunk, faces, material, placing, runs);
+            return;
+        }
         // Texture coordinates stay with a material that may yet turn out to have a texture.
         let textured = used.material.material.texture.is_some() || !used.defined;
         runs.push(Run { faces, part, textured });
+    }
+
+    /// Appends faces of a material whose textures are UDIM tiles to `runs`: each is of the material
+    /// of its tile.
+    fn tile_runs(
+        &mut self,
+        chunk: &Statements,
+        faces: Range<usize>,
+        material: u32,
+        placing: &mut Placing,
+        runs: &mut Vec<Run>,
+    ) {
+        let corners_of = |faces: Range<usize>| -> usize {
+            chunk.faces[faces].iter().map(|&count| count as usize).sum()
+        };
+        placing.corner += corners_of(placing.corner_face..faces.start);
+        placing.corner_face = faces.end;
+        let mut last: Option<(Option<u32>, u32)> = None;
+        for face in faces {
+            let count = chunk.faces[face] as usize;
+            let corners = &chunk.corners[placing.corner..placing.corner + count];
+            placing.corner += count;
+            let texcoords = corners.iter().filter_map(|[_, texcoord]| {
+                let texcoord = texcoord.resolve(placing.texcoords_before)?;
+                self.texcoords.get(texcoord as usize).copied()
+            });
+            let base = &self.materials[material as usize].material;
+            let tile = base.tile_of(texcoords);
+            self.faces_across_tiles += u64::from(tile.as_ref().is_none_or(|tile| !tile.holds_face));
+            let tile = tile.map(|tile| tile.number);
+            let part = match last {
+                Some((known, part)) if known == tile => {
+                    if let Some(run) = runs.last_mut() {
+                        run.faces.end = face + 1;
+                    }
+                    part
+                }
+                _ => {
+                    let of_tile = tile.map_or(material, |tile| self.tile_material(material, tile));
+                    let part = self.part_of(of_tile);
+                    let textured =
+                        self.materials[of_tile as usize].material.material.texture.is_some();
+                    runs.push(Run { faces: face..face + 1, part, textured });
+                    part
+                }
+            };
+            last = Some((tile, part));
+        }
+    }
+
+    /// The material of a UDIM tile.
+    fn tile_material(&mut self, material: u32, tile: u32) -> u32 {
+        if let Some(known) = self.material_of_tile.get(&(material, tile)) {
+            return *known;
+        }
+        let name = self.materials[material as usize].name.clone();
+        let made = self.library.tile(
+            &name,
+            tile,
+            self.path,
+            &mut self.finder,
+            &mut self.textures,
+            &mut self.warnings,
+        );
+        let index = self.materials.len() as u32;
+        let material_of_tile = made.unwrap_or_else(|| MtlMaterial::plain(""));
+        self.materials.push(UsedMaterial { name, material: material_of_tile, defined: true });
+        self.material_of_tile.insert((material, tile), index);
+        index
     }
 
     /// Moves a chunk's triangles into their parts.
@@ -324,22 +444,16 @@ impl<'a> Obj<'a> {
     }
 
     /// A name that comes again right away goes on with its group; after another it is a new one.
-    fn start_group(&mut self, name: &str) {
-        let stem;
-        let name = if name.is_empty() {
-            stem = super::stem(self.path);
-            &stem
-        } else {
-            name
-        };
+    fn start_group(&mut self, name: Vec<u8>) {
+        let name = if name.is_empty() { super::stem(self.path).into_bytes() } else { name };
         if name != self.group_name {
-            self.group_name = name.to_owned();
+            self.group_name = name;
             self.group = None;
             self.part = None;
         }
     }
 
-    fn use_material(&mut self, name: &str) {
+    fn use_material(&mut self, name: &[u8]) {
         let material = match self.material_of_name.get(name) {
             Some(material) => *material,
             None => self.new_material(name),
@@ -350,7 +464,7 @@ impl<'a> Obj<'a> {
         }
     }
 
-    fn new_material(&mut self, name: &str) -> u32 {
+    fn new_material(&mut self, name: &[u8]) -> u32 {
         let made = self.library.material(
             name,
             self.path,
@@ -360,96 +474,181 @@ impl<'a> Obj<'a> {
         );
         let index = self.materials.len() as u32;
         self.materials.push(UsedMaterial {
+            name: name.to_vec(),
             defined: made.is_some(),
-            material: made.unwrap_or_else(|| MtlMaterial::plain(name)),
+            material: made.unwrap_or_else(|| MtlMaterial::plain("")),
         });
-        self.material_of_name.insert(name.to_owned(), index);
+        self.material_of_name.insert(name.to_vec(), index);
         index
     }
 
-    /// The part of the current group and material; group and part are made where they are new.
+    /// The part of the current group and material.
     fn start_part(&mut self) -> u32 {
         let material = match self.material {
             Some(material) => material,
             None => {
                 // Faces before the first usemtl; the name cannot be one that a file gives.
-                let material = self.materials.len() as u32;
-                self.materials
-                    .push(UsedMaterial { material: MtlMaterial::plain(""), defined: true });
-                *self.material.insert(material)
+                let index = self.materials.len() as u32;
+                let (name, material) = (Vec::new(), MtlMaterial::plain(""));
+                self.materials.push(UsedMaterial { name, material, defined: true });
+                *self.material.insert(index)
             }
         };
-        let group = *self.group.get_or_insert_with(|| {
-            self.groups.push(Group { name: self.group_name.clone() });
-            self.groups.len() as u32 - 1
-        });
-        let parts = &mut self.parts;
-        let part = *self.part_of.entry((group, material)).or_insert_with(|| {
-            let part = Part { group, material, ..Part::default() };
-            parts.push(PartState { part, bare_faces: 0 });
-            parts.len() as u32 - 1
-        });
+        let part = self.part_of(material);
         self.part = Some(part);
         part
     }
 
-    /// `mtllib` names one file, in which there may be spaces, or several.
-    fn read_libraries(&mut self, names: &str) {
-        let whole = self.finder.find(names);
-        let files: Vec<(&str, Option<PathBuf>)> = match whole {
-            Some(file) => vec![(names, Some(file))],
-            None => {
-                let each: Vec<_> =
-                    names.split_whitespace().map(|name| (name, self.finder.find(name))).collect();
-                if each.iter().any(|(_, file)| file.is_some()) { each } else { vec![(names, None)] }
-            }
-        };
-        for (name, file) in files {
-            let problem = match file.map(|file| (std::fs::read(&file), file)) {
-                Some((Ok(bytes), file)) => {
-                    self.library.add(&bytes);
-                    self.libraries_read += 1;
-                    self.dependencies.push(file);
-                    continue;
-                }
-                Some((Err(error), _)) => format!("cannot be read ({error})"),
-                None => "not found".to_owned(),
-            };
-            let what = format!("{}: material library {name} {problem}", self.path.display());
-            self.warnings.add(what, 1);
-        }
+    /// The part of the current group and a material; group and part are made where they are new.
+    fn part_of(&mut self, material: u32) -> u32 {
+        let group = *self.group.get_or_insert_with(|| {
+            self.groups.push(self.group_name.clone());
+            self.groups.len() as u32 - 1
+        });
+        let parts = &mut self.parts;
+        *self.part_of.entry((group, material)).or_insert_with(|| {
+            let part = Part { group, material, ..Part::default() };
+            parts.push(PartState { part, bare_faces: 0 });
+            parts.len() as u32 - 1
+        })
     }
 
-    /// Libraries may come after the faces that use them; what none defines is plain grey.
+    /// `mtllib` names one file or several. Any of them may have spaces, and a comment may follow.
+    fn read_libraries(&mut self, names: &[u8]) {
+        let words = Words::of(names);
+        let mut missing: Option<Range<usize>> = None;
+        let mut at = 0;
+        while at < words.len() {
+            let Some((end, file)) = self.longest_library(&words, at) else {
+                if words.run(at..at + 1).starts_with(b"#") && at > 0 {
+                    break;
+                }
+                let from = missing.take().map_or(at, |missing| missing.start);
+                at += 1;
+                missing = Some(from..at);
+                if is_library(words.run(at - 1..at)) {
+                    self.miss_library(&words, missing.take());
+                }
+                continue;
+            };
+            self.miss_library(&words, missing.take());
+            self.library_encoding = self.library_encoding.or(self.finder.encoding());
+            at = end;
+            if self.libraries.contains(&file) {
+                continue;
+            }
+            match std::fs::read(&file) {
+                Ok(bytes) => {
+                    self.library.add(&bytes, self.library_encoding);
+                    self.dependencies.push(file.clone());
+                    self.libraries.insert(file);
+                }
+                Err(error) => self.warn_of_library(
+                    file.as_os_str().as_encoded_bytes(),
+                    &format!("cannot be read ({error})"),
+                ),
+            }
+        }
+        self.miss_library(&words, missing);
+    }
+
+    /// The library that the words from `at` on name, and the word behind its name. As they are
+    /// written they may be any words; otherwise they end with the first that ends in `.mtl`.
+    fn longest_library(&mut self, words: &Words, at: usize) -> Option<(usize, PathBuf)> {
+        let written = words.longest_file(at, words.len(), |name| self.finder.as_written(name));
+        written.or_else(|| {
+            let mut ends = at + 1..words.len();
+            let end = ends.find(|end| is_library(words.run(end - 1..*end)));
+            let last = end.unwrap_or(words.len());
+            words.longest_file(at, last, |name| self.finder.existing(name))
+        })
+    }
+
+    fn miss_library(&mut self, words: &Words, missing: Option<Range<usize>>) {
+        let Some(missing) = missing else { return };
+        let name = words.run(missing);
+        self.finder.find(name);
+        self.warn_of_library(name, "not found");
+    }
+
+    fn warn_of_library(&mut self, name: &[u8], problem: &str) {
+        let name = names::display(name, self.encoding());
+        let what = format!("{}: material library {name} {problem}", self.path.display());
+        self.warnings.add(what, 1);
+    }
+
+    /// The likely encoding of names that are not UTF-8.
+    fn encoding(&self) -> Option<&'static Encoding> {
+        self.library_encoding.or(self.traits.encoding).or_else(|| self.sample.guess())
+    }
+
+    /// Libraries may come after the faces that use them; what none defines is plain: white where
+    /// vertices have colours, grey elsewhere.
     fn resolve_materials(&mut self) {
-        let names: Vec<(String, u32)> = std::mem::take(&mut self.material_of_name)
-            .into_iter()
-            .filter(|(_, index)| !self.materials[*index as usize].defined)
+        let has_colors = self.traits.has_colors || self.colors.len() > 0;
+        let plain_color = if has_colors { "white" } else { "grey" };
+        let undefined: Vec<u32> = std::mem::take(&mut self.material_of_name)
+            .into_values()
+            .filter(|index| !self.materials[*index as usize].defined)
             .collect();
+        let encoding = self.encoding();
         let file = self.path.display();
-        for (name, index) in names {
-            let made = self.library.material(
-                &name,
+        for index in undefined {
+            let used = &mut self.materials[index as usize];
+            let mut made = self.library.material(
+                &used.name,
                 self.path,
                 &mut self.finder,
                 &mut self.textures,
                 &mut self.warnings,
             );
-            if let Some(made) = made {
-                self.materials[index as usize].material = made;
-            } else if self.libraries_read > 0 {
-                let what = format!("{file}: material {name} is in no library, taken as plain grey");
-                self.warnings.add(what, 1);
-            } else {
-                let what =
-                    format!("{file}: usemtl without a material library, taken as plain grey");
-                self.warnings.add(what, 1);
+            if made.as_ref().is_some_and(|made| made.is_tiled) {
+                let what = "material that is used before its library: of UDIM tiles 1001 alone";
+                self.warnings.add(format!("{file}: {what}"), 1);
+                made = self.library.tile(
+                    &used.name,
+                    FIRST_TILE,
+                    self.path,
+                    &mut self.finder,
+                    &mut self.textures,
+                    &mut self.warnings,
+                );
             }
-            if self.materials[index as usize].material.material.texture.is_none() {
+            match made {
+                Some(made) => used.material = made,
+                None => {
+                    let name = names::display(&used.name, encoding);
+                    let what = match self.libraries.is_empty() {
+                        true => "usemtl without a material library".to_owned(),
+                        false => format!("material {name} is in no library"),
+                    };
+                    self.warnings.add(format!("{file}: {what}, taken as plain {plain_color}"), 1);
+                    used.material.material.name = name;
+                }
+            }
+            if used.material.material.texture.is_none() {
                 let of_material = |state: &&mut PartState| state.part.material == index;
                 self.parts.iter_mut().filter(of_material).for_each(|state| state.bare_faces = 0);
             }
         }
+        if has_colors {
+            for used in self.materials.iter_mut().filter(|used| !used.material.has_color) {
+                let [color @ .., _] = &mut used.material.material.base_color;
+                *color = [1.0; 3];
+            }
+        }
+    }
+
+    /// Makes linear light of all colours.
+    fn settle_colors(&mut self) {
+        if !self.color_range.has_fractions {
+            let colors = self.colors.iter_mut();
+            self.stats.colors_clamped += make_linear(colors, self.color_range);
+        }
+        self.color_range.report(self.path, &mut self.warnings);
+        let what =
+            "face in no single UDIM tile, textured by the tile of its middle if there is one";
+        self.warnings.add(format!("{}: {what}", self.path.display()), self.faces_across_tiles);
     }
 
     /// Gives the parts their vertices. What the file says of these is as large as the parts are, and
@@ -510,6 +709,7 @@ impl<'a> Obj<'a> {
             return Err(Error::input(self.path, what));
         }
         self.resolve_materials();
+        self.settle_colors();
         self.stats.unused_vertices = self.unifier.unused(self.positions.len());
         let vertices = std::mem::take(&mut self.unifier).numbered(self.parts.len());
         let timer = StageTimer::current();
@@ -530,12 +730,15 @@ impl<'a> Obj<'a> {
             }
         }
         self.stats.report(self.path, &mut self.warnings);
+        let encoding = self.encoding();
+        let name = |name: Vec<u8>| Group { name: names::display(&name, encoding) };
+        let groups = self.groups.into_iter().map(name).collect();
         self.dependencies.extend(self.textures.dependencies());
         self.dependencies.extend(self.finder.absent());
         super::assemble(Model {
             source: self.path.to_path_buf(),
             dependencies: self.dependencies,
-            groups: self.groups,
+            groups,
             parts: kept,
             materials: self.materials.into_iter().map(|used| used.material.material).collect(),
             textures: self.textures.list,
@@ -543,6 +746,12 @@ impl<'a> Obj<'a> {
             warnings: self.warnings,
         })
     }
+}
+
+/// True where a word ends the name of a material library.
+fn is_library(word: &[u8]) -> bool {
+    let word = word.strip_suffix(b"\"").unwrap_or(word);
+    word[word.len().saturating_sub(4)..].eq_ignore_ascii_case(b".mtl")
 }
 
 /// Pushes one of `count` elements.

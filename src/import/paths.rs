@@ -1,52 +1,133 @@
 //! Finds the files that a model names, also when the names come from another machine.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
+
+use encoding_rs::Encoding;
+
+use super::names::{folded, forms, unescaped};
 
 /// Folders beside the model in which exporters put textures.
 const USUAL_FOLDERS: [&str; 5] = ["textures", "texture", "tex", "images", "maps"];
 
+/// Longest path that systems allow, in bytes.
+const LONGEST_PATH: usize = 4096;
+
 /// Looks up file names on behalf of one model.
 pub(super) struct Finder {
     folder: PathBuf,
-    /// Files of the model's folder and the usual ones below it by lower-case name, listed when
-    /// first needed.
-    listing: Option<BTreeMap<String, PathBuf>>,
+    /// What is in each folder that was searched.
+    listings: BTreeMap<PathBuf, Listing>,
     /// See [`Finder::absent`].
     absent: Vec<PathBuf>,
+    /// See [`Finder::encoding`].
+    encoding: Option<&'static Encoding>,
+}
+
+/// The entries of a folder by [`folded`] name; of several that differ in case alone, the first in
+/// the order of names.
+#[derive(Default)]
+struct Listing {
+    files: BTreeMap<Vec<u8>, PathBuf>,
+    folders: BTreeMap<Vec<u8>, PathBuf>,
 }
 
 impl Finder {
     /// For the model at `model`.
     pub(super) fn new(model: &Path) -> Self {
         let folder = model.parent().unwrap_or(Path::new("")).to_path_buf();
-        Self { folder, listing: None, absent: Vec::new() }
+        Self { folder, listings: BTreeMap::new(), absent: Vec::new(), encoding: None }
     }
 
-    /// The file that `name` means: as written (relative to the model's folder); with backslashes
-    /// as slashes; the end of the path below the model's folder, longest first; and the base name
-    /// in that folder or one for textures beside the model, in whatever case of letters.
-    pub(super) fn find(&mut self, name: &str) -> Option<PathBuf> {
-        let name = name.trim().trim_matches('"');
-        if name.is_empty() || name.contains('\0') {
-            return None;
-        }
-        let slashed = name.replace('\\', "/");
-        let components: Vec<&str> =
-            slashed.split('/').filter(|part| !part.is_empty() && *part != ".").collect();
-        let ends = (0..components.len()).map(|from| components[from..].join("/"));
-        let found = [name.to_owned(), slashed.clone()]
-            .into_iter()
-            .chain(ends)
-            .map(|candidate| self.folder.join(candidate))
-            .find(|candidate| candidate.is_file())
-            .or_else(|| self.listing().get(&components.last()?.to_lowercase()).cloned());
-        if found.is_none() {
-            let base_name = components.last().map(|&name| name.to_owned());
+    /// The file that `name` means, as [`Self::existing`] finds it. Where there is none, remembers
+    /// that it is missing.
+    pub(super) fn find(&mut self, name: impl AsRef<[u8]>) -> Option<PathBuf> {
+        let name = name.as_ref();
+        let found = self.existing(name);
+        if found.is_none() && is_possible(name) {
+            let slashed = with_slashes(&unescaped(name));
+            let base_name = components(&slashed).last().map(|name| name.to_vec());
             let places = [Some(slashed.clone()), base_name].into_iter().flatten();
-            self.absent.extend(places.map(|place| self.folder.join(place)));
+            self.absent.extend(places.map(|place| self.folder.join(OsStr::from_bytes(&place))));
         }
         found
+    }
+
+    /// The file that `name` means, where there is one. Tries the name in each of its [`forms`]: as
+    /// written (relative to the model's folder); with backslashes as slashes; the end of the path
+    /// below the model's folder, longest first; the same in another case of letters and another
+    /// normal form; and the base name in a folder for textures beside the model.
+    pub(super) fn existing(&mut self, name: impl AsRef<[u8]>) -> Option<PathBuf> {
+        let name = name.as_ref();
+        if !is_possible(name) {
+            return None;
+        }
+        let literal = name.trim_ascii();
+        let unescaped = unescaped(name);
+        let spellings = [literal, &unescaped];
+        let count = if literal == &unescaped[..] { 1 } else { 2 };
+        for form in spellings[..count].iter().flat_map(|spelling| forms(spelling)) {
+            let slashed = with_slashes(&form.name);
+            let components = components(&slashed);
+            let found = self.exactly(&form.name, &components).or_else(|| self.alike(&components));
+            if found.is_some() {
+                self.encoding = self.encoding.or(form.encoding);
+                return found;
+            }
+        }
+        None
+    }
+
+    /// The file at `name` as it is written, relative to the model's folder.
+    pub(super) fn as_written(&self, name: &[u8]) -> Option<PathBuf> {
+        let file = self.folder.join(OsStr::from_bytes(name));
+        (is_possible(name) && file.is_file()).then_some(file)
+    }
+
+    fn exactly(&self, name: &[u8], components: &[&[u8]]) -> Option<PathBuf> {
+        let slashed = with_slashes(name);
+        let ends = (0..components.len()).map(|from| components[from..].join(&b'/'));
+        let mut candidates = [name.to_vec(), slashed].into_iter().chain(ends);
+        candidates.find_map(|candidate| self.as_written(&candidate))
+    }
+
+    fn alike(&mut self, components: &[&[u8]]) -> Option<PathBuf> {
+        let here = self.folder.clone();
+        let below = (0..components.len()).find_map(|from| self.walk(&here, &components[from..]));
+        below.or_else(|| {
+            let base_name = components.last()?;
+            let usual: Vec<PathBuf> = self.listing(&here).usual_folders().collect();
+            usual.iter().find_map(|folder| self.walk(folder, &[base_name]))
+        })
+    }
+
+    /// The file that is reached from `folder` by these names, without regard to case and normal
+    /// form.
+    fn walk(&mut self, folder: &Path, components: &[&[u8]]) -> Option<PathBuf> {
+        let (name, parents) = components.split_last()?;
+        let mut folder = folder.to_path_buf();
+        for parent in parents {
+            folder = match *parent {
+                b".." => folder.join(".."),
+                parent => self.listing(&folder).folders.get(&folded(parent))?.clone(),
+            };
+        }
+        self.listing(&folder).files.get(&folded(name)).cloned()
+    }
+
+    fn listing(&mut self, folder: &Path) -> &Listing {
+        if !self.listings.contains_key(folder) {
+            self.listings.insert(folder.to_path_buf(), Listing::of(folder));
+        }
+        &self.listings[folder]
+    }
+
+    /// The encoding of the first name that is not UTF-8 and whose file was found: that of the
+    /// model's names.
+    pub(super) fn encoding(&self) -> Option<&'static Encoding> {
+        self.encoding
     }
 
     /// Where files that were asked for and not found would be looked for first: should one appear
@@ -54,38 +135,55 @@ impl Finder {
     pub(super) fn absent(self) -> Vec<PathBuf> {
         self.absent
     }
+}
 
-    fn listing(&mut self) -> &BTreeMap<String, PathBuf> {
-        self.listing.get_or_insert_with(|| {
-            let mut files = BTreeMap::new();
-            // A model named without a folder lies in the current one.
-            let here =
-                if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder };
-            let entries = sorted_entries(here);
-            let usual = entries.iter().filter(|path| {
-                let name = path.file_name().map(|name| name.to_string_lossy().to_lowercase());
-                name.is_some_and(|name| USUAL_FOLDERS.contains(&name.as_str()))
-            });
-            let below: Vec<PathBuf> = usual.flat_map(|folder| sorted_entries(folder)).collect();
-            for path in entries.iter().chain(&below) {
-                let Some(name) = path.file_name() else { continue };
-                // The model's own folder goes first, and the order is that of names.
-                let key = name.to_string_lossy().to_lowercase();
-                if !files.contains_key(&key) && path.is_file() {
-                    files.insert(key, self.folder.join(path.strip_prefix(here).unwrap_or(path)));
-                }
-            }
-            files
-        })
+impl Listing {
+    /// Of a folder; empty where it is none or cannot be read.
+    fn of(folder: &Path) -> Self {
+        // A model named without a folder lies in the current one.
+        let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let mut names: Vec<_> = here
+            .read_dir()
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|entry| entry.file_name())
+            .collect();
+        names.sort();
+        let mut listing = Self::default();
+        for name in names {
+            let path = folder.join(&name);
+            let Ok(metadata) = path.metadata() else { continue };
+            let entries = match metadata.is_dir() {
+                true => &mut listing.folders,
+                false if metadata.is_file() => &mut listing.files,
+                false => continue,
+            };
+            entries.entry(folded(name.as_bytes())).or_insert(path);
+        }
+        listing
+    }
+
+    fn usual_folders(&self) -> impl Iterator<Item = PathBuf> {
+        let is_usual = |name: &[u8]| USUAL_FOLDERS.iter().any(|usual| usual.as_bytes() == name);
+        let folders = self.folders.iter().filter(move |(name, _)| is_usual(name));
+        folders.map(|(_, folder)| folder.clone())
     }
 }
 
-/// What is in `folder`, sorted; nothing where it is no folder or cannot be read.
-fn sorted_entries(folder: &Path) -> Vec<PathBuf> {
-    let mut paths: Vec<PathBuf> =
-        folder.read_dir().into_iter().flatten().flatten().map(|entry| entry.path()).collect();
-    paths.sort();
-    paths
+/// False of what no file is called.
+fn is_possible(name: &[u8]) -> bool {
+    let name = name.trim_ascii();
+    !name.is_empty() && name.len() <= LONGEST_PATH && !name.contains(&0)
+}
+
+fn with_slashes(name: &[u8]) -> Vec<u8> {
+    name.iter().map(|byte| if *byte == b'\\' { b'/' } else { *byte }).collect()
+}
+
+/// The names along a path.
+fn components(path: &[u8]) -> Vec<&[u8]> {
+    path.split(|byte| *byte == b'/').filter(|name| !matches!(name, [] | [b'.'])).collect()
 }
 
 #[cfg(test)]
@@ -123,6 +221,38 @@ mod tests {
                 "{name}"
             );
         }
+    }
+
+    #[test]
+    fn names_in_other_encodings_normal_forms_and_case_are_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        std::fs::create_dir_all(root.join("Bilder")).unwrap();
+        let gbk = encoding_rs::GBK.encode("墙.png").0.into_owned();
+        for name in ["大地.png".as_bytes(), "cafe\u{301}.png".as_bytes(), "my wall.png".as_bytes()]
+        {
+            std::fs::write(root.join(OsStr::from_bytes(name)), "").unwrap();
+        }
+        std::fs::write(root.join("Bilder/u\u{308}ber.png"), "").unwrap();
+        std::fs::write(root.join(OsStr::from_bytes(&gbk)), "").unwrap();
+        let mut finder = Finder::new(&root.join("city.obj"));
+        let mut found = |name: &[u8]| {
+            let found = finder.find(name)?;
+            Some(found.strip_prefix(root).unwrap().as_os_str().as_bytes().to_vec())
+        };
+        for (name, expected) in [
+            ("Caf\u{e9}.PNG", "cafe\u{301}.png"),
+            ("bilder\\\u{dc}BER.png", "Bilder/u\u{308}ber.png"),
+            ("my\\ wall.png", "my wall.png"),
+            ("\"my wall.png\"", "my wall.png"),
+        ] {
+            assert_eq!(found(name.as_bytes()).unwrap(), expected.as_bytes(), "{name}");
+        }
+        assert_eq!(found(&encoding_rs::GBK.encode("大地.png").0).unwrap(), "大地.png".as_bytes());
+        assert_eq!(found("墙.png".as_bytes()).unwrap(), gbk);
+        assert_eq!(found(&gbk).unwrap(), gbk);
+        assert_eq!(found("壁.png".as_bytes()), None);
+        assert_eq!(finder.encoding().map(Encoding::name), Some("gb18030"));
     }
 
     /// Without `.` components, which `Path` equality ignores only in the middle.

@@ -44,6 +44,8 @@ pub struct TextureCache<'a> {
 struct Slot {
     takers: u32,
     state: State,
+    /// The image has an alpha channel that no material uses.
+    has_unused_alpha: bool,
 }
 
 #[derive(Debug, Default)]
@@ -52,6 +54,11 @@ enum State {
     Waiting,
     Decoded(Arc<Decoded>),
     Failed(String),
+}
+
+/// True of an OBJ, whose materials use the alpha channel of a texture where they say so.
+fn is_obj(model: &Model) -> bool {
+    model.source.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"))
 }
 
 impl<'a> TextureCache<'a> {
@@ -89,7 +96,7 @@ impl<'a> TextureCache<'a> {
         let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
         slot.takers = slot.takers.saturating_sub(1);
         if matches!(slot.state, State::Waiting) {
-            slot.state = self.decode(texture);
+            (slot.state, slot.has_unused_alpha) = self.decode(texture);
         }
         let State::Decoded(decoded) = &slot.state else { return None };
         let decoded = Arc::clone(decoded);
@@ -99,29 +106,42 @@ impl<'a> TextureCache<'a> {
         Some(decoded)
     }
 
-    fn decode(&self, texture: u32) -> State {
+    /// The image, and whether it has an alpha channel that no material uses.
+    fn decode(&self, texture: u32) -> (State, bool) {
         let source = &self.model.textures[texture as usize];
         let image = match decode::decode_texture(source) {
             Ok(image) => image,
-            Err(error) => return State::Failed(error.to_string()),
+            Err(error) => return (State::Failed(error.to_string()), false),
         };
         let bytes = image.texels() * u64::from(image.channels);
         if image.texels() == 0 || image.pixels.len() as u64 != bytes {
             let size = format!("{} × {}", image.width, image.height);
-            return State::Failed(format!("{}: an image of {size} texels", source.name));
+            let what = format!("{}: an image of {size} texels", source.name);
+            return (State::Failed(what), false);
         }
-        let alpha = self.plan.needs_alpha(texture) && image.has_transparency();
-        let image = if alpha { image } else { image.into_opaque() };
-        State::Decoded(Arc::new(Decoded::new(image)))
+        let is_used = self.plan.needs_alpha(texture);
+        let has_alpha = image.has_transparency();
+        let image = if is_used && has_alpha { image } else { image.into_opaque() };
+        (State::Decoded(Arc::new(Decoded::new(image))), has_alpha && !is_used)
     }
 
-    /// One warning for each image that could not be decoded, in the model's order.
+    /// One warning for each image that could not be decoded, and for each of an OBJ whose alpha
+    /// channel no material uses, in the model's order.
     pub fn warnings(&self) -> Warnings {
         let mut warnings = Warnings::default();
-        for slot in &self.slots {
+        for (slot, source) in self.slots.iter().zip(&self.model.textures) {
             let slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
             if let State::Failed(what) = &slot.state {
                 warnings.add(format!("{what}; drawn without texture"), 1);
+            }
+            if slot.has_unused_alpha && is_obj(self.model) {
+                let what = format!(
+                    "{}: texture {} has transparency that its material does not use, drawn opaque; \
+                     a map_d of the same file uses it",
+                    self.model.source.display(),
+                    source.name
+                );
+                warnings.add(what, 1);
             }
         }
         warnings

@@ -4,19 +4,20 @@
 //! beginning, and the parser records how many elements the chunk needs before it. A chunk that
 //! needs more than there are is parsed once more, face by face ([`Statements::settle`]).
 
+use std::borrow::Cow;
+
 use super::super::clean::CleanStats;
 use super::super::lines::{Lines, text};
+use super::super::plain_text::BYTE_ORDER_MARK;
 use super::super::tokens::{Corner, NO_ELEMENT, corner, corner_at, number, plain_decimal_at, word};
+use super::colors::Colors;
 use super::index_faults::IndexFaults;
-use crate::color::{srgb_to_linear, unorm16};
 
 /// Most corners of a face: beyond this the ear clipping's own indices could overflow.
 const MOST_CORNERS: usize = 1 << 20;
 
 /// Most vertices of a file, so that every index fits 32 bits with room for markers.
 pub(in crate::import) const MOST_VERTICES: usize = u32::MAX as usize - 64;
-
-pub(in crate::import) const WHITE: [u16; 4] = [u16::MAX; 4];
 
 /// Added to indices that are relative to the chunk's beginning; above twice any other index.
 const RELATIVE: i64 = 1 << 62;
@@ -56,20 +57,29 @@ impl Reference {
     }
 }
 
-/// A statement that changes what the faces behind it belong to.
+/// A statement that changes what the faces behind it belong to, with the name or names that it
+/// gives, of unknown encoding.
 #[derive(Debug)]
 pub(in crate::import) enum Change {
-    Group(String),
-    Material(String),
-    Libraries(String),
+    Group(Vec<u8>),
+    Material(Vec<u8>),
+    Libraries(Vec<u8>),
+}
+
+impl Change {
+    /// What the statement gives.
+    pub(in crate::import) fn name(&self) -> &[u8] {
+        match self {
+            Self::Group(name) | Self::Material(name) | Self::Libraries(name) => name,
+        }
+    }
 }
 
 /// A chunk's statements.
 #[derive(Default)]
 pub(in crate::import) struct Statements {
     pub(in crate::import) positions: Vec<[f64; 3]>,
-    /// Empty until a vertex of the chunk has a colour, then one per position.
-    pub(in crate::import) colors: Vec<[u16; 4]>,
+    pub(in crate::import) colors: Colors,
     pub(in crate::import) texcoords: Vec<[f64; 2]>,
     /// Position and texture coordinate of all faces' corners.
     pub(in crate::import) corners: Vec<[Reference; 2]>,
@@ -148,9 +158,7 @@ impl Statements {
             [b'v', b' ', rest @ ..] => {
                 let ([x, y, z], rest) = plain_decimals(rest)?;
                 let rest = line_end(rest)?;
-                if !self.colors.is_empty() {
-                    self.colors.push(WHITE);
-                }
+                self.colors.push_none();
                 self.positions.push([x, y, z]);
                 Some(rest)
             }
@@ -192,15 +200,18 @@ impl Statements {
     /// Reads a statement that begins in this line of the chunk.
     fn statement(&mut self, statement: &[u8], line: u64) -> Result<(), String> {
         let mut rest = statement;
-        let name = |rest| text(rest).trim().to_owned();
-        let change = match word(&mut rest) {
-            Some(b"v") => return self.position(rest),
-            Some(b"vt") => return self.texcoord(rest),
-            Some(b"f" | b"fo") => return self.face(rest, line),
-            Some(b"o" | b"g") => Change::Group(name(rest)),
-            Some(b"usemtl") => Change::Material(name(rest)),
-            Some(b"mtllib") => Change::Libraries(name(rest)),
-            Some(b"p" | b"l" | b"curv" | b"curv2" | b"surf") => {
+        let Some(keyword) = word(&mut rest) else { return Ok(()) };
+        // Files that were joined may have a mark in their middle.
+        let keyword = keyword.strip_prefix(BYTE_ORDER_MARK).unwrap_or(keyword);
+        let name = |rest: &[u8]| rest.trim_ascii().to_vec();
+        let change = match &lower_case(keyword)[..] {
+            b"v" => return self.position(rest),
+            b"vt" => return self.texcoord(rest),
+            b"f" | b"fo" => return self.face(rest, line),
+            b"o" | b"g" => Change::Group(name(rest)),
+            b"usemtl" => Change::Material(name(rest)),
+            b"mtllib" => Change::Libraries(name(rest)),
+            b"p" | b"l" | b"curv" | b"curv2" | b"surf" => {
                 self.stats.not_triangles += 1;
                 return Ok(());
             }
@@ -228,15 +239,9 @@ impl Statements {
             return Err(format!("vertex of {count} coordinates; expected 3"));
         }
         if count >= 6 {
-            let given = [values[3], values[4], values[5]];
-            if given.iter().any(|part| !(0.0..=1.0).contains(part)) {
-                self.stats.colors_clamped += 1;
-            }
-            let [r, g, b] = given.map(|part| unorm16(srgb_to_linear(part)));
-            self.colors.resize(self.positions.len(), WHITE);
-            self.colors.push([r, g, b, u16::MAX]);
-        } else if !self.colors.is_empty() {
-            self.colors.push(WHITE);
+            self.colors.push([values[3], values[4], values[5]], self.positions.len());
+        } else {
+            self.colors.push_none();
         }
         self.positions.push([values[0], values[1], values[2]]);
         Ok(())
@@ -330,6 +335,14 @@ impl Statements {
             index => reference(index, 1),
         };
         self.corners.push([position, texcoord]);
+    }
+}
+
+/// A keyword in lower case.
+fn lower_case(keyword: &[u8]) -> Cow<'_, [u8]> {
+    match keyword.iter().any(u8::is_ascii_uppercase) {
+        true => Cow::Owned(keyword.to_ascii_lowercase()),
+        false => Cow::Borrowed(keyword),
     }
 }
 

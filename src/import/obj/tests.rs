@@ -3,8 +3,8 @@ use std::fs;
 use super::super::lines::text;
 use super::super::tests::check;
 use super::*;
-use crate::color::{srgb_to_linear, unorm16};
-use crate::mesh::{AlphaMode, Wrap};
+use crate::color::{linear_to_byte, srgb_to_linear, unorm16};
+use crate::mesh::Wrap;
 use crate::random::Random;
 
 /// Reads `obj` as `city.obj` from a folder that also holds `files`.
@@ -27,7 +27,9 @@ fn read_from(folder: &tempfile::TempDir, obj: impl AsRef<[u8]>) -> Result<Model>
 }
 
 fn read_in_chunks(folder: &tempfile::TempDir, obj: &[u8], chunk_bytes: usize) -> Result<Model> {
-    super::read(&folder.path().join("city.obj"), obj, chunk_bytes)
+    let path = folder.path().join("city.obj");
+    let text = super::super::plain_text(&path, obj)?;
+    super::read(&path, text, FileTraits::default(), chunk_bytes)
 }
 
 /// The model or the error must be the same wherever the text is divided.
@@ -110,7 +112,7 @@ fn texture_coordinates_are_transformed_then_flipped() {
         "mtllib my lib.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 nan\nusemtl m\n\
          f 1/1 2/2 3/3\nf 1/1 3/3 4\nf 1/4 2/2 4/3"
     );
-    let mtl = "newmtl m\nmap_Kd -clamp on -s 2 4 1 -o 0.5 0.25 my brick.png\nmap_d my brick.png\n";
+    let mtl = "newmtl m\nmap_Kd -clamp on -s 2 4 1 -o 0.5 0.25 my brick.png\n";
     let model = read(obj, &[("my lib.mtl", mtl), ("my brick.png", "")]).unwrap();
     let part = &model.parts[0];
     let texcoords: Vec<_> = part.indices.iter().map(|at| part.texcoords[*at as usize]).collect();
@@ -118,7 +120,6 @@ fn texture_coordinates_are_transformed_then_flipped() {
     assert_eq!(texcoords[5], [0.0, 0.0], "a corner without a texture coordinate");
     assert_eq!(texcoords[6], [0.5, -3.25], "u and v are 0 and 1 where one is not finite");
     assert_eq!(model.materials[0].wrap, [Wrap::Clamp; 2]);
-    assert_eq!(model.materials[0].alpha, AlphaMode::Mask { cutoff: 0.5 });
     assert_eq!(model.textures.len(), 1);
     assert_eq!(model.dependencies.len(), 3);
     let expected = [
@@ -225,7 +226,7 @@ fn vertex_colours_are_linear_and_white_ones_are_dropped() {
     let colors = &model.parts[0].colors;
     assert_eq!(colors[0], [65535; 4]);
     assert_eq!(colors[1], [unorm16(srgb_to_linear(0.5)), 0, 65535, 65535]);
-    assert_eq!(warnings(&model), [("vertex colour outside 0 to 1, clamped".to_owned(), 1)]);
+    assert_eq!(warnings(&model), [("vertex colour out of range, clamped".to_owned(), 1)]);
     let white = "v 0 0 0 1 1 1\nv 1 0 0 1.0 1.0 1.0\nv 0 1 0 1 1 1\nf 1 2 3\n";
     assert!(read(white, &[]).unwrap().parts[0].colors.is_empty());
     // Colours that begin after a part has vertices.
@@ -233,6 +234,221 @@ fn vertex_colours_are_linear_and_white_ones_are_dropped() {
     let model = read(late, &[]).unwrap();
     assert_eq!(model.parts[0].colors[..3], [[65535; 4]; 3]);
     assert_eq!(model.parts[0].colors[3], [0, 0, 0, 65535]);
+}
+
+/// The colour that vertices have: theirs times that of their material, in sRGB bytes.
+fn shown(model: &Model) -> Vec<[u8; 3]> {
+    let of_part = |part: &crate::mesh::Part| {
+        let base = model.materials[part.material as usize].base_color;
+        let colors = part.colors.clone();
+        (0..part.positions.len()).map(move |vertex| {
+            let color = colors.get(vertex).copied().unwrap_or(WHITE);
+            [0, 1, 2].map(|at| {
+                let linear = f64::from(base[at]) * f64::from(color[at]) / 65535.0;
+                linear_to_byte().of(unorm16(linear))
+            })
+        })
+    };
+    model.parts.iter().flat_map(of_part).collect()
+}
+
+#[test]
+fn vertex_colours_without_a_material_are_shown_as_they_are() {
+    let grey = "v 0 0 0 0.5 0.5 0.5\nv 1 0 0 0.5 0.5 0.5\nv 1 1 0 0.5 0.5 0.5\n";
+    let white = "v 0 0 0 1 1 1\nv 1 0 0 1 1 1\nv 1 1 0 1 1 1\n";
+    let some = "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 1 1 0\n";
+    let named = "mtllib a.mtl\nusemtl gone\n";
+    let files =
+        [("a.mtl", "newmtl a\nKd 1 1 1\nnewmtl bare\nillum 2\nnewmtl half\nKd 0.5 0.5 0.5\n")];
+    for (start, vertices, expected) in [
+        ("", grey, [[128; 3]; 3]),
+        ("", white, [[255; 3]; 3]),
+        ("", some, [[255, 0, 0], [255, 0, 0], [255; 3]]),
+        (named, grey, [[128; 3]; 3]),
+        ("usemtl gone\n", grey, [[128; 3]; 3]),
+        ("mtllib a.mtl\nusemtl bare\n", grey, [[128; 3]; 3]),
+        ("mtllib a.mtl\nusemtl half\n", white, [[128; 3]; 3]),
+        ("", SQUARE, [[204; 3]; 3]),
+    ] {
+        let model = read(format!("{start}{vertices}f 1 2 3\n"), &files).unwrap();
+        assert_eq!(shown(&model), expected, "{start}{vertices}");
+        let warned = warnings(&model).iter().any(|(what, _)| what.contains("taken as plain white"));
+        assert_eq!(warned, start.contains("gone"));
+    }
+}
+
+#[test]
+fn vertex_colours_of_0_to_255_are_read_as_bytes() {
+    let vertices = |colors: [&str; 3]| {
+        let [a, b, c] = colors;
+        format!("v 0 0 0 {a}\nv 1 0 0 {b}\nv 1 1 0 {c}\nf 1 2 3\n")
+    };
+    let bytes = "vertex colours are integers of 0 to 255, divided by 255";
+    let clamped = "vertex colour out of range, clamped";
+    for (colors, expected, expected_warnings) in [
+        (["255 128 0", "1 1 1", "0 0 2"], [[255, 128, 0], [1; 3], [0, 0, 2]], vec![(bytes, 1)]),
+        (["255.0 128.000 0", "1 1 1", ""], [[255, 128, 0], [1; 3], [255; 3]], vec![(bytes, 1)]),
+        (
+            ["300 -1 7", "0 0 9", ""],
+            [[255, 0, 7], [0, 0, 9], [255; 3]],
+            vec![(bytes, 1), (clamped, 2)],
+        ),
+        (["1 0 1", "0 0 0", "1 1 1"], [[255, 0, 255], [0; 3], [255; 3]], vec![]),
+        (["2 0 0", "0.5 0 1", ""], [[255, 0, 0], [128, 0, 255], [255; 3]], vec![(clamped, 1)]),
+        (["0.5 0 1", "2 0 0", ""], [[128, 0, 255], [255, 0, 0], [255; 3]], vec![(clamped, 1)]),
+        (
+            ["nan 0 9", "inf 0 0", ""],
+            [[0, 0, 9], [255, 0, 0], [255; 3]],
+            vec![(bytes, 1), (clamped, 2)],
+        ),
+    ] {
+        let obj = vertices(colors);
+        let model = read(&obj, &[]).unwrap();
+        assert_eq!(shown(&model), expected, "{obj}");
+        let expected_warnings: Vec<_> =
+            expected_warnings.iter().map(|(what, times)| ((*what).to_owned(), *times)).collect();
+        assert_eq!(warnings(&model), expected_warnings, "{obj}");
+        check_chunks(&folder_with(&[]), obj.as_bytes());
+    }
+}
+
+/// A textured square, whose library and texture have these names.
+fn textured(library: &str, material: &str) -> String {
+    format!(
+        "mtllib {library}\n{SQUARE}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl {material}\n\
+         f 1/1 2/2 3/3 4/4\n"
+    )
+}
+
+#[test]
+fn texts_of_any_encoding_and_line_ends_are_the_same() {
+    let obj =
+        format!("# façade\n{}g wall façade\nf 1/1 2/2 3/3 \\\n4/4\n", textured("a.mtl", "façade"));
+    let mtl = "newmtl façade\nKd 1 0 0\nmap_Kd t.png\n";
+    let utf_16 = |text: &str, bytes_of: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        format!("\u{feff}{text}").encode_utf16().flat_map(bytes_of).collect()
+    };
+    let variants = |text: &str| {
+        [
+            text.as_bytes().to_vec(),
+            format!("\u{feff}{text}").into_bytes(),
+            text.replace('\n', "\r\n").into_bytes(),
+            text.replace('\n', "\r").into_bytes(),
+            utf_16(text, u16::to_le_bytes),
+            utf_16(&text.replace('\n', "\r\n"), u16::to_be_bytes),
+            utf_16(&text.replace('\n', "\r"), u16::to_le_bytes),
+        ]
+    };
+    let folder = folder_with(&[("t.png", "")]);
+    fs::write(folder.path().join("a.mtl"), mtl).unwrap();
+    let expected = format!("{:?}", read_from(&folder, &obj).unwrap());
+    for obj in variants(&obj) {
+        for mtl in variants(mtl) {
+            fs::write(folder.path().join("a.mtl"), mtl).unwrap();
+            assert_eq!(format!("{:?}", read_from(&folder, &obj).unwrap()), expected);
+        }
+        check_chunks(&folder, &obj);
+    }
+}
+
+#[test]
+fn keywords_are_read_in_any_case() {
+    let obj = textured("a.mtl", "a");
+    let folder = folder_with(&[("a.mtl", "NEWMTL a\nMAP_KD t.png\n"), ("t.png", "")]);
+    let expected = format!("{:?}", read_from(&folder, &obj).unwrap());
+    for keyword in ["mtllib", "usemtl", "vt", "v", "f"] {
+        let upper = obj.replace(&format!("{keyword} "), &format!("{} ", keyword.to_uppercase()));
+        assert_eq!(format!("{:?}", read_from(&folder, &upper).unwrap()), expected, "{upper}");
+    }
+}
+
+#[test]
+fn names_in_a_code_page_are_found_and_shown() {
+    let gbk = |text: &str| encoding_rs::GBK.encode(text).0.into_owned();
+    let folder = folder_with(&[("大地形.png", "")]);
+    let obj = format!("{}g 屋顶\nf 1/1 2/2 3/3\n", textured("大地形.mtl", "墙"));
+    let mtl = "newmtl 墙\nmap_Kd 大地形.png\n";
+    fs::write(folder.path().join("大地形.mtl"), mtl).unwrap();
+    let expected = format!("{:?}", read_from(&folder, &obj).unwrap());
+    assert!(expected.contains("屋顶") && expected.contains("墙"), "{expected}");
+    for mtl in [mtl.as_bytes().to_vec(), gbk(mtl)] {
+        fs::write(folder.path().join("大地形.mtl"), mtl).unwrap();
+        assert_eq!(format!("{:?}", read_from(&folder, gbk(&obj)).unwrap()), expected);
+        assert_eq!(format!("{:?}", read_from(&folder, &obj).unwrap()), expected);
+        check_chunks(&folder, &gbk(&obj));
+    }
+}
+
+#[test]
+fn several_libraries_may_have_spaces_escapes_and_comments() {
+    let files = [
+        ("a.mtl", "newmtl a\nKd 1 0 0\n"),
+        ("my b.mtl", "newmtl b\nKd 0 1 0\n"),
+        ("my lib 2.MTL", "newmtl c\nKd 0 0 1\n"),
+        ("d # 1.mtl", "newmtl d\nKd 1 1 0\n"),
+    ];
+    let colors = [
+        ("a", [1., 0., 0., 1.]),
+        ("b", [0., 1., 0., 1.]),
+        ("c", [0., 0., 1., 1.]),
+        ("d", [1., 1., 0., 1.]),
+    ];
+    for (libraries, found, missing) in [
+        ("a.mtl my b.mtl my lib 2.mtl", "abc", vec![]),
+        ("my b.mtl a.mtl # and more.mtl", "ab", vec![]),
+        ("\"my b.mtl\" a.mtl", "ab", vec![]),
+        ("my\\ b.mtl lib/a.mtl", "ab", vec![]),
+        ("C:\\lib\\a.mtl C:\\my files\\my b.mtl", "ab", vec![]),
+        ("d # 1.mtl", "d", vec![]),
+        ("gone.mtl a.mtl not here.mtl", "a", vec!["gone.mtl", "not here.mtl"]),
+        ("nothing", "", vec!["nothing"]),
+    ] {
+        let uses: String =
+            colors.iter().map(|(name, _)| format!("usemtl {name}\nf 1 2 3\n")).collect();
+        let model = read(format!("mtllib {libraries}\n{SQUARE}{uses}"), &files).unwrap();
+        for (material, (name, color)) in model.materials.iter().zip(&colors) {
+            let is_found = material.base_color == *color;
+            assert_eq!(is_found, found.contains(name), "{libraries}: {name}");
+        }
+        let expected: Vec<String> =
+            missing.iter().map(|name| format!("material library {name} not found")).collect();
+        let warned = warnings(&model).into_iter().map(|(what, _)| what);
+        let of_libraries: Vec<String> = warned.filter(|what| what.contains("not found")).collect();
+        assert_eq!(of_libraries, expected, "{libraries}");
+    }
+}
+
+#[test]
+fn udim_tiles_are_materials_of_their_own() {
+    let obj = format!(
+        "mtllib a.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 1 1\nvt 1 0\nvt 2 0\nvt 2 1\nvt 0.5 1.25\n\
+         vt 0.75 1.25\nvt 0.75 1.5\nvt -3 0\nusemtl m\nf 1/1 2/2 3/3\nf 1/4 2/5 4/6\nf 2/7 3/8 4/9\n\
+         f 1/1 3/2 4/3\nf 3/10 2/10 1/10\n"
+    );
+    let mtl = "newmtl m\nKd 1 1 1\nmap_Kd t_<UDIM>.png\n";
+    let files = [("a.mtl", mtl), ("t_1001.png", ""), ("t_1002.png", "")];
+    let model = read(&obj, &files).unwrap();
+    check_chunks(&folder_with(&files), obj.as_bytes());
+    let of_part: Vec<_> = model
+        .parts
+        .iter()
+        .map(|part| {
+            let texture = model.materials[part.material as usize].texture;
+            let name = texture.map(|texture| model.textures[texture as usize].name.as_str());
+            (name, part.indices.len() / 3)
+        })
+        .collect();
+    let expected = [(None, 1), (Some("t_1001.png"), 2), (Some("t_1002.png"), 1), (None, 1)];
+    assert_eq!(of_part, expected);
+    for part in &model.parts[1..3] {
+        assert!(part.texcoords.as_flattened().iter().all(|at| (0.0..=1.0).contains(at)));
+    }
+    let across = "face in no single UDIM tile, textured by the tile of its middle if there is one";
+    let expected = [("material m: texture t_1011.png not found", 1), (across, 1)];
+    let found = warnings(&model);
+    for (what, times) in expected {
+        assert!(found.contains(&(what.to_owned(), times)), "{found:?}");
+    }
 }
 
 #[test]

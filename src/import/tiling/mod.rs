@@ -25,10 +25,13 @@ use self::spilled::Spilled;
 use self::tile_text::{Belongs, FaceCorner, Names, TileReader, TileText};
 use super::clean::CleanStats;
 use super::find::{Kind, kind};
+use super::names::NameSample;
 use super::obj::chunks::Chunks;
+use super::obj::colors::{ColorRange, WHITE};
 use super::obj::index_faults::IndexFaults;
-use super::obj::statements::{Change, MOST_VERTICES, Statements, WHITE};
-use super::obj::{BYTE_ORDER_MARK, Batch, CHUNK_BYTES, Parsed, load_part, text_of};
+use super::obj::statements::{Change, MOST_VERTICES, Statements};
+use super::obj::{Batch, CHUNK_BYTES, FileTraits, Parsed, load_part};
+use super::plain_text::PlainText;
 use crate::bytes::Bytes;
 use crate::mesh::{Model, Triangulator, UpAxis, UpEvidence, UpGuess, Warnings};
 use crate::stage_timer::StageTimer;
@@ -62,6 +65,7 @@ pub struct Tiling {
     file: Arc<File>,
     tiles: Vec<TileText>,
     up: UpAxis,
+    traits: FileTraits,
     warnings: Warnings,
 }
 
@@ -151,7 +155,7 @@ impl Tiling {
     pub fn load(&self, tile: usize) -> Result<Model> {
         let pieces = self.tiles[tile].pieces.iter();
         let reader = TileReader { file: Arc::clone(&self.file), pieces, piece: (0, 0) };
-        let mut model = load_part(&self.source, reader)?;
+        let mut model = load_part(&self.source, reader, self.traits.clone())?;
         if tile == 0 {
             model.warnings.extend(self.warnings.clone());
         }
@@ -161,12 +165,8 @@ impl Tiling {
 
 /// Goes through a file, chunk by chunk.
 fn each_chunk(path: &Path, mut add: impl FnMut(Parsed) -> Result<()> + Send) -> Result<()> {
-    let mut reader = super::open(path)?;
-    let mut head = text_of(path, &mut reader)?;
-    if head.starts_with(BYTE_ORDER_MARK) {
-        head.drain(..BYTE_ORDER_MARK.len());
-    }
-    let mut chunks = Chunks::new(head, reader, CHUNK_BYTES);
+    let PlainText { head, rest } = super::open_text(path)?;
+    let mut chunks = Chunks::new(head, rest, CHUNK_BYTES);
     let timer = StageTimer::current();
     let mut batch = Batch::parse(&mut chunks);
     loop {
@@ -236,8 +236,12 @@ struct Tiler<'a> {
     placed: usize,
     bodies: Bodies,
     texcoords: Spilled<[f64; 2]>,
-    /// Empty until a vertex has a colour, then one per position.
+    /// One per position where a vertex has a colour; linear light.
     colors: Spilled<[u16; 4]>,
+    color_range: ColorRange,
+    /// Names that faces belong to.
+    sample: NameSample,
+    traits: FileTraits,
     names: Names,
     belongs: Belongs,
     triangulator: Triangulator,
@@ -262,6 +266,9 @@ impl<'a> Tiler<'a> {
             bodies: Bodies::default(),
             texcoords: Spilled::new(dir)?,
             colors: Spilled::new(dir)?,
+            color_range: ColorRange::default(),
+            sample: NameSample::default(),
+            traits: FileTraits::default(),
             names: Names::default(),
             belongs: Belongs::default(),
             triangulator: Triangulator::default(),
@@ -277,6 +284,9 @@ impl<'a> Tiler<'a> {
         // Texture coordinates do not matter here.
         let before = self.positions.len();
         chunk.settle(&text, [before, MOST_VERTICES]);
+        self.traits.has_colors |= !chunk.colors.values.is_empty();
+        self.color_range = self.color_range.joined(chunk.colors.range);
+        chunk.changes.iter().for_each(|(_, change)| self.sample.add(change.name()));
         self.positions.extend(std::mem::take(&mut chunk.positions))?;
         self.bodies.grow(self.positions.len());
         self.bodies.join_faces(&chunk, before);
@@ -327,11 +337,11 @@ impl<'a> Tiler<'a> {
         self.index_faults.add(&chunk.index_faults, self.lines);
         self.lines += chunk.lines;
         self.stats.add(&chunk.stats);
-        if self.colors.len() > 0 || !chunk.colors.is_empty() {
-            let missing = before[0] - self.colors.len();
-            self.colors.extend(std::iter::repeat_n(WHITE, missing))?;
-            let missing = chunk.positions.len() - chunk.colors.len();
-            self.colors.extend(std::mem::take(&mut chunk.colors))?;
+        if self.traits.has_colors {
+            chunk.colors.settle(self.color_range);
+            self.stats.colors_clamped += chunk.colors.clamped;
+            let missing = chunk.positions.len() - chunk.colors.values.len();
+            self.colors.extend(chunk.colors.values.drain(..))?;
             self.colors.extend(std::iter::repeat_n(WHITE, missing))?;
         }
         self.placed += chunk.positions.len();
@@ -427,11 +437,14 @@ impl<'a> Tiler<'a> {
         }
         let mut warnings = self.warnings;
         self.index_faults.report(self.path, &mut warnings);
+        self.color_range.report(self.path, &mut warnings);
         self.stats.report(self.path, &mut warnings);
         let mut tiles = self.tiles;
         tiles.retain(|tile| !tile.pieces.is_empty());
+        self.traits.encoding = self.sample.guess();
         let source = self.path.to_path_buf();
-        Ok(Tiling { source, file: Arc::new(self.file), tiles, up, warnings })
+        let file = Arc::new(self.file);
+        Ok(Tiling { source, file, tiles, up, traits: self.traits, warnings })
     }
 }
 

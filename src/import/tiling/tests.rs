@@ -1,6 +1,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
+use std::io::Write as _;
 
 use super::*;
 use crate::random::Random;
@@ -47,7 +48,7 @@ fn hills(side: usize) -> String {
 
 fn tiled(path: &Path, vertices: u64) -> Result<Tiling> {
     let dir = path.parent().unwrap();
-    let bounds = super::super::bounds(path).unwrap();
+    let bounds = super::super::bounds(path)?;
     Tiling::of(path, bounds, Some(UpAxis::Z), vertices, dir)
 }
 
@@ -217,7 +218,7 @@ fn what_is_imperfect_is_counted_once() {
     for what in [
         "not finite, dropped",
         "free-form element",
-        "colour outside",
+        "colour out of range",
         "vertex index that is 0 or out of range",
         "texture coordinate index that is 0 or out of range",
     ] {
@@ -225,4 +226,44 @@ fn what_is_imperfect_is_counted_once() {
         let whole = count(super::super::load(&path).unwrap(), what);
         assert_eq!((in_tiles, whole), (1, 1), "{what}");
     }
+}
+
+/// Colours, their range and the encoding of names are those of the whole file, also in tiles that
+/// show nothing of them.
+#[test]
+fn tiles_share_what_is_known_of_the_whole_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hills.obj");
+    let name = encoding_rs::WINDOWS_1251.encode("кирпичная стена дома").0.into_owned();
+    let mut text = Vec::new();
+    for line in hills(40).replace(" 0.5 ", " 9 ").lines() {
+        // Colours in one corner alone, as bytes, and names in a code page.
+        let words: Vec<&str> = line.split(' ').collect();
+        match words[..] {
+            ["v", x, y, z, ..] => {
+                let color = if x < "678030" && y < "5403030" { " 255 0 128" } else { "" };
+                writeln!(text, "v {x} {y} {z}{color}").unwrap();
+            }
+            ["g", ..] => text.extend([b"g ", &name[..], b"\n"].concat()),
+            _ => writeln!(text, "{line}").unwrap(),
+        }
+    }
+    fs::write(&path, text).unwrap();
+    let tiling = tiled(&path, 200).unwrap();
+    assert!(tiling.tiles() > 4);
+    let whole = super::super::load(&path).unwrap();
+    let bytes = |model: &Model| {
+        model.warnings.iter().filter(|(text, _)| text.contains("divided by 255")).count()
+    };
+    assert_eq!(bytes(&whole), 1);
+    let mut colors = std::collections::BTreeSet::new();
+    for tile in 0..tiling.tiles() {
+        let model = tiling.load(tile).unwrap();
+        assert!(model.materials.iter().all(|material| material.base_color == [1.0; 4]));
+        assert!(model.groups.iter().skip(1).all(|group| group.name == "кирпичная стена дома"));
+        assert_eq!(bytes(&model), usize::from(tile == 0));
+        colors.extend(model.parts.into_iter().flat_map(|part| part.colors));
+    }
+    let in_whole = whole.parts.into_iter().flat_map(|part| part.colors);
+    assert!(in_whole.into_iter().all(|color| colors.contains(&color)));
 }

@@ -50,12 +50,12 @@ pub(super) struct Belongs {
     pub material: usize,
 }
 
-/// All statements so far that faces may belong to: lines of text.
+/// What all statements so far that faces may belong to give, in the encoding of the file.
 #[derive(Default)]
 pub(super) struct Names {
-    pub libraries: Vec<String>,
-    pub groups: Vec<String>,
-    pub materials: Vec<String>,
+    pub libraries: Vec<Vec<u8>>,
+    pub groups: Vec<Vec<u8>>,
+    pub materials: Vec<Vec<u8>>,
 }
 
 /// A tile whose text is being written.
@@ -131,7 +131,7 @@ impl TileText {
         let mut text = Vec::with_capacity(64 * self.corners.len());
         // In the places that they have in the file, since materials are those known by then.
         for library in &names.libraries[self.libraries..] {
-            writeln!(text, "mtllib {library}")?;
+            text.extend([b"mtllib ", &library[..], b"\n"].concat());
         }
         self.libraries = names.libraries.len();
         for (at, color) in &self.positions {
@@ -151,10 +151,11 @@ impl TileText {
         let counts = [self.positions.len(), self.texcoords.len()].map(|count| count as i64);
         for &(count, belongs) in &self.faces {
             if belongs.group != self.belongs.group {
-                writeln!(text, "o {}", names.groups[belongs.group - 1])?;
+                text.extend([b"o ", &names.groups[belongs.group - 1][..], b"\n"].concat());
             }
             if belongs.material != self.belongs.material {
-                writeln!(text, "usemtl {}", names.materials[belongs.material - 1])?;
+                let name = &names.materials[belongs.material - 1][..];
+                text.extend([b"usemtl ", name, b"\n"].concat());
             }
             self.belongs = belongs;
             text.push(b'f');
