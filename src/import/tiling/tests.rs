@@ -52,6 +52,37 @@ fn tiled(path: &Path, vertices: u64) -> Result<Tiling> {
     Tiling::of(path, bounds, Some(UpAxis::Z), vertices, dir)
 }
 
+#[test]
+fn the_up_axis_is_that_of_the_whole_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = hills(40);
+    // The same with Y up: (x, y, z) becomes (x, z, -y).
+    let turned = |line: &str| match line.strip_prefix("v ") {
+        Some(rest) => {
+            let mut words = rest.splitn(4, ' ');
+            let mut next = || words.next().unwrap_or_default();
+            let (x, y, z, rest) = (next(), next(), next(), next());
+            format!("v {x} {z} -{y} {rest}")
+        }
+        None => line.to_owned(),
+    };
+    let turned: Vec<String> = text.lines().map(turned).collect();
+    for (up, text) in [(UpAxis::Z, text), (UpAxis::Y, turned.join("\n"))] {
+        let path = folder.path().join("hills.obj");
+        fs::write(&path, text).unwrap();
+        let bounds = super::super::bounds(&path).unwrap();
+        let whole = UpEvidence::of(&super::super::load(&path).unwrap()).guess();
+        assert_eq!(whole, UpGuess { axis: up, is_clear: true });
+        for vertices in [100, 1 << 20] {
+            let dir = folder.path();
+            let tiling = Tiling::of(&path, bounds, None, vertices, dir, &CpuTime::default());
+            let tiling = tiling.unwrap();
+            assert_eq!(tiling.up(), up);
+            assert_eq!(tiling.tiles() > 1, vertices == 100);
+        }
+    }
+}
+
 /// Area on the ground by names of group and material.
 fn areas(model: &Model, areas: &mut BTreeMap<(String, String), f64>) {
     for part in &model.parts {
