@@ -100,7 +100,11 @@ fn ground(node: u32, across: u32, textured: bool) -> NodeMesh {
     });
     let mut bytes = std::io::Cursor::new(Vec::new());
     let images = if textured && picture.write_to(&mut bytes, image::ImageFormat::Png).is_ok() {
-        let data = NodeImageData::Embedded { mime: "image/png", bytes: bytes.into_inner() };
+        let data = NodeImageData::Embedded {
+            mime: "image/png",
+            bytes: bytes.into_inner(),
+            file_name: None,
+        };
         vec![NodeImage { width: 1024, height: 1024, data }]
     } else {
         Vec::new()

@@ -58,7 +58,11 @@ fn node_file() -> Vec<u8> {
         images: vec![NodeImage {
             width: 1,
             height: 1,
-            data: NodeImageData::Embedded { mime: "image/jpeg", bytes: vec![7; 40] },
+            data: NodeImageData::Embedded {
+                mime: "image/jpeg",
+                bytes: vec![7; 40],
+                file_name: None,
+            },
         }],
         primitives: vec![Primitive {
             positions: vec![[0.0; 3]; 4],

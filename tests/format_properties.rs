@@ -151,10 +151,11 @@ prop_compose! {
 }
 
 fn image() -> impl Strategy<Value = NodeImage> {
-    let embedded = (prop_oneof![Just("image/jpeg"), Just("image/png")], vec(any::<u8>(), 1..50))
-        .prop_map(|(mime, bytes)| NodeImageData::Embedded { mime, bytes });
-    let shared = "[a-z0-9_-][a-z0-9._-]{0,20}"
-        .prop_map(|name| NodeImageData::Shared { file_name: Arc::from(name) });
+    let file_name = || "[a-z0-9_-][a-z0-9._-]{0,20}".prop_map(Arc::<str>::from);
+    let mime = prop_oneof![Just("image/jpeg"), Just("image/png")];
+    let embedded = (mime, vec(any::<u8>(), 1..50), prop::option::of(file_name()))
+        .prop_map(|(mime, bytes, file_name)| NodeImageData::Embedded { mime, bytes, file_name });
+    let shared = file_name().prop_map(|file_name| NodeImageData::Shared { file_name });
     (any::<u32>(), any::<u32>(), prop_oneof![embedded, shared])
         .prop_map(|(width, height, data)| NodeImage { width, height, data })
 }

@@ -85,7 +85,8 @@ fn mesh(primitives: Vec<Primitive>) -> NodeMesh {
 fn png(image: &RgbaImage) -> NodeImage {
     let mut bytes = Cursor::new(Vec::new());
     image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
-    let data = NodeImageData::Embedded { mime: "image/png", bytes: bytes.into_inner() };
+    let data =
+        NodeImageData::Embedded { mime: "image/png", bytes: bytes.into_inner(), file_name: None };
     NodeImage { width: image.width(), height: image.height(), data }
 }
 

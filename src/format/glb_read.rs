@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::TEXTURES_DIR;
+use super::TEXTURES_URI;
 use super::bytes::Cursor;
 use super::file_name::is_plain_file_name;
 use super::glb_packed::decode;
@@ -358,23 +358,29 @@ impl<'a> Reader<'a> {
     }
 
     fn image(&mut self, image: &schema::Image) -> Parsed<NodeImage> {
-        let schema::Image { buffer_view, mime_type, uri, extras } = image;
-        let data = match (buffer_view, mime_type.as_deref(), uri) {
-            (Some(view), Some(mime), None) => {
+        let schema::Image { name, buffer_view, mime_type, uri, extras } = image;
+        let data = match (buffer_view, mime_type.as_deref(), uri, name) {
+            (Some(view), Some(mime), None, name) => {
                 let mime = match mime {
                     "image/jpeg" => "image/jpeg",
                     "image/png" => "image/png",
                     other => return Err(format!("expected JPEG or PNG, found {other}")),
                 };
-                NodeImageData::Embedded { mime, bytes: self.view(*view, "image")?.to_vec() }
+                if let Some(name) = name.as_ref().filter(|name| !is_plain_file_name(name)) {
+                    return Err(format!("expected a plain file name, found {name:?}"));
+                }
+                NodeImageData::Embedded {
+                    mime,
+                    bytes: self.view(*view, "image")?.to_vec(),
+                    file_name: name.as_deref().map(Arc::from),
+                }
             }
-            (None, None, Some(uri)) => {
+            (None, None, Some(uri), None) => {
                 let file_name = uri
-                    .strip_prefix("../")
-                    .and_then(|uri| uri.strip_prefix(TEXTURES_DIR))
+                    .strip_prefix(TEXTURES_URI)
                     .and_then(|uri| uri.strip_prefix('/'))
                     .filter(|name| is_plain_file_name(name))
-                    .ok_or_else(|| format!("expected ../{TEXTURES_DIR}/NAME, found {uri:?}"))?;
+                    .ok_or_else(|| format!("expected {TEXTURES_URI}/NAME, found {uri:?}"))?;
                 NodeImageData::Shared { file_name: Arc::from(file_name) }
             }
             _ => return Err("expected a buffer view and its type, or a URI".into()),

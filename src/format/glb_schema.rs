@@ -206,6 +206,8 @@ pub(super) struct Sampler {
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub(super) struct Image {
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub buffer_view: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mime_type: Option<String>,

@@ -295,7 +295,7 @@ fn other_readers_see_the_same_surfaces() {
     assert_eq!(texture.sampler().wrap_t(), gltf::texture::WrappingMode::MirroredRepeat);
     assert!(matches!(
         texture.source().source(),
-        gltf::image::Source::Uri { uri: "../textures/fence-64.png", .. }
+        gltf::image::Source::Uri { uri: "textures/fence-64.png", .. }
     ));
     let colors = primitives[1].get(&gltf::Semantic::Colors(0)).unwrap();
     assert!(colors.normalized());
@@ -320,8 +320,13 @@ fn what_breaks_a_promise_is_not_written() {
         ("plain file name", |m| {
             m.images[0].data = NodeImageData::Shared { file_name: "../x.png".into() };
         }),
+        ("plain file name", |m| {
+            let NodeImageData::Embedded { file_name, .. } = &mut m.images[0].data else { return };
+            *file_name = Some("../x.png".into());
+        }),
         ("JPEG or PNG", |m| {
-            m.images[0].data = NodeImageData::Embedded { mime: "image/bmp", bytes: vec![1] };
+            m.images[0].data =
+                NodeImageData::Embedded { mime: "image/bmp", bytes: vec![1], file_name: None };
         }),
     ];
     for (words, spoil) in cases {
@@ -407,8 +412,10 @@ fn lies_in_the_json_are_refused() {
         ("\"sampler\":0", "\"sampler\":9", "found 9"),
         ("\"source\":0", "\"source\":9", "found 9"),
         ("\"mesh\":0", "\"mesh\":1", "mesh Some(1) of 1"),
-        ("../textures/", "../../etc/", "expected ../textures/NAME"),
-        ("../textures/", "../textures/../", "expected ../textures/NAME"),
+        ("\"textures/", "\"../textures/", "expected textures/NAME"),
+        ("textures/", "textures/../", "expected textures/NAME"),
+        ("\"uri\":", "\"name\":\"x\",\"uri\":", "expected a buffer view"),
+        ("\"mimeType\":", "\"name\":\"../x\",\"mimeType\":", "plain file name"),
         ("\"image/png\"", "\"image/gif\"", "found image/gif"),
         ("\"matrix\":[1.0", "\"matrix\":[2.0", "a matrix that turns"),
         ("\"MASK\"", "\"BLEND\"", "do not agree"),

@@ -1,6 +1,6 @@
 //! Writes a node as GLB, the binary form of glTF 2.0.
 
-use super::TEXTURES_DIR;
+use super::TEXTURES_URI;
 use super::encoding::Encoding;
 use super::file_name::is_plain_file_name;
 use super::glb_packed::{encode_triangles, encode_vertices};
@@ -420,23 +420,34 @@ impl Writer {
     }
 
     fn image(&mut self, image: &NodeImage) -> Result<(), String> {
-        let (buffer_view, mime_type, uri) = match &image.data {
-            NodeImageData::Embedded { mime, bytes } => {
+        if let Some(name) = image.repeating()
+            && !is_plain_file_name(name)
+        {
+            return Err(format!("expected a plain file name, found {name:?}"));
+        }
+        let extras = ImageSize { width: image.width, height: image.height };
+        let image = match &image.data {
+            NodeImageData::Embedded { mime, bytes, file_name } => {
                 if !["image/jpeg", "image/png"].contains(mime) || bytes.is_empty() {
                     return Err(format!("expected JPEG or PNG, found {mime}"));
                 }
-                let view = self.view(None, |bin| bin.extend_from_slice(bytes));
-                (Some(view), Some((*mime).to_owned()), None)
-            }
-            NodeImageData::Shared { file_name } => {
-                if !is_plain_file_name(file_name) {
-                    return Err(format!("expected a plain file name, found {file_name:?}"));
+                Image {
+                    name: file_name.as_deref().map(str::to_owned),
+                    buffer_view: Some(self.view(None, |bin| bin.extend_from_slice(bytes))),
+                    mime_type: Some((*mime).to_owned()),
+                    uri: None,
+                    extras,
                 }
-                (None, None, Some(format!("../{TEXTURES_DIR}/{file_name}")))
             }
+            NodeImageData::Shared { file_name } => Image {
+                name: None,
+                buffer_view: None,
+                mime_type: None,
+                uri: Some(format!("{TEXTURES_URI}/{file_name}")),
+                extras,
+            },
         };
-        let extras = ImageSize { width: image.width, height: image.height };
-        self.root.images.push(Image { buffer_view, mime_type, uri, extras });
+        self.root.images.push(image);
         Ok(())
     }
 

@@ -3,7 +3,7 @@
 //! ```text
 //! out/scene.hlod      the hierarchy: Scene
 //! out/nodes/*.glb     one file per node: NodeMesh
-//! out/textures/*      repeating pictures that many nodes share
+//! out/nodes/textures/* repeating textures that many nodes share
 //! out/tileset.json    the same for viewers that read 3D Tiles
 //! out/tilesets/*      regions of it, where the city is large
 //! out/build.json      what the build did, for people and scripts
@@ -69,8 +69,11 @@ pub const BOXES_DIR: &str = "boxes";
 pub const SCENE_FILE: &str = "scene.hlod";
 /// The folder of node files inside an output folder.
 pub const NODES_DIR: &str = "nodes";
-/// The folder of shared pictures inside an output folder.
-pub const TEXTURES_DIR: &str = "textures";
+/// The folder of shared textures inside an output folder. It lies below [`NODES_DIR`], so that node
+/// files refer to it without `..`, which some readers refuse.
+pub const TEXTURES_DIR: &str = "nodes/textures";
+/// [`TEXTURES_DIR`] as node files refer to it: relative to [`NODES_DIR`].
+const TEXTURES_URI: &str = "textures";
 /// The report of the build inside an output folder.
 pub const REPORT_FILE: &str = "build.json";
 

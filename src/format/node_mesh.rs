@@ -24,12 +24,25 @@ pub enum NodeImageData {
         mime: &'static str,
         /// The encoded picture.
         bytes: Vec<u8>,
+        /// Of a repeating texture, the file name that it has where nodes share it; `None` of an
+        /// atlas.
+        file_name: Option<Arc<str>>,
     },
-    /// A repeating picture stored once in `textures/`; this is its file name there.
+    /// A repeating texture stored once in [`TEXTURES_DIR`](super::TEXTURES_DIR).
     Shared {
-        /// File name inside `textures/`, without folders; only `[a-z0-9._-]`.
+        /// File name inside that folder, without folders; only `[a-z0-9._-]`.
         file_name: Arc<str>,
     },
+}
+
+impl NodeImage {
+    /// The file name of a repeating texture, shared or embedded; `None` of an atlas.
+    pub fn repeating(&self) -> Option<&Arc<str>> {
+        match &self.data {
+            NodeImageData::Embedded { file_name, .. } => file_name.as_ref(),
+            NodeImageData::Shared { file_name } => Some(file_name),
+        }
+    }
 }
 
 /// How the triangles of a primitive look.

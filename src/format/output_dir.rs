@@ -20,6 +20,11 @@ use super::{
 use crate::builder::Subset;
 use crate::{Error, Result};
 
+/// The folder of shared textures in results of versions whose node files named `../textures/`.
+const EARLIER_TEXTURES_DIR: &str = "textures";
+/// Extensions of shared textures.
+const IMAGE_KINDS: &[&str] = &["jpg", "png"];
+
 const PARTIAL: &str = "hlod-partial-";
 const ASIDE: &str = "hlod-old";
 
@@ -306,28 +311,32 @@ fn sorted_names(listing: fs::ReadDir) -> io::Result<Vec<OsString>> {
 
 /// The first thing in a folder that no build writes, relative to the folder.
 fn first_foreign(target: &Path, names: &[OsString]) -> Option<PathBuf> {
-    for name in names {
+    names.iter().find_map(|name| {
         let kinds: &[&str] = match name.to_str() {
-            Some(SCENE_FILE | REPORT_FILE | TILESET_FILE | RIMS_FILE | CELLS_FILE) => continue,
+            Some(SCENE_FILE | REPORT_FILE | TILESET_FILE | RIMS_FILE | CELLS_FILE) => return None,
             Some(NODES_DIR | CELLS_DIR) => &["glb"],
-            Some(TEXTURES_DIR) => &["jpg", "png"],
+            Some(EARLIER_TEXTURES_DIR) => IMAGE_KINDS,
             Some(TILESETS_DIR) => &["json"],
-            Some(SUBSETS_DIR) if is_of_subsets(&target.join(name)) => continue,
+            Some(SUBSETS_DIR) if is_of_subsets(&target.join(name)) => return None,
             _ => return Some(name.into()),
         };
-        // What is not a folder, or cannot be listed, is not ours either.
-        let Ok(inner) = fs::read_dir(target.join(name)).and_then(sorted_names) else {
-            return Some(name.into());
-        };
-        let ours = |inner: &OsString| {
-            let kind = Path::new(inner).extension().unwrap_or_default();
-            kinds.iter().any(|ours| kind == *ours)
-        };
-        if let Some(inner) = inner.iter().find(|inner| !ours(inner)) {
-            return Some(Path::new(name).join(inner));
+        foreign_in(target, Path::new(name), kinds)
+    })
+}
+
+/// The first thing below a folder that is neither a file of these kinds nor a shared texture,
+/// relative to `target`; the folder itself where it is not one or cannot be listed.
+fn foreign_in(target: &Path, folder: &Path, kinds: &[&str]) -> Option<PathBuf> {
+    let Ok(names) = fs::read_dir(target.join(folder)).and_then(sorted_names) else {
+        return Some(folder.into());
+    };
+    names.iter().map(|name| folder.join(name)).find_map(|path| {
+        if path == Path::new(TEXTURES_DIR) {
+            return foreign_in(target, &path, IMAGE_KINDS);
         }
-    }
-    None
+        let kind = path.extension().unwrap_or_default();
+        (!kinds.iter().any(|ours| kind == *ours)).then_some(path)
+    })
 }
 
 /// Whether there is nothing in a folder but results of subsets, finished or not.

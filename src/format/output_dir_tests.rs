@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::output_dir::{OutputDir, check_apart};
-use super::{SCENE_FILE, SCENE_MAGIC};
+use super::{SCENE_FILE, SCENE_MAGIC, TEXTURES_DIR};
 
 fn message<T: std::fmt::Debug>(result: crate::Result<T>) -> String {
     let error = result.unwrap_err();
@@ -120,6 +120,16 @@ fn what_is_not_ours_is_refused_and_left_alone() {
     fs::write(out.join("nodes/tower.blend"), "precious").unwrap();
     assert!(message(OutputDir::create(&out)).contains("holds nodes/tower.blend"));
     fs::remove_file(out.join("nodes/tower.blend")).unwrap();
+    for folder in [TEXTURES_DIR, "textures"] {
+        // The second one is where earlier versions had them.
+        fs::create_dir(out.join(folder)).unwrap();
+        fs::write(out.join(folder).join("brick.jpg"), "ours").unwrap();
+        drop(OutputDir::create(&out).unwrap());
+        fs::write(out.join(folder).join("brick.psd"), "precious").unwrap();
+        let holds = format!("holds {folder}/brick.psd");
+        assert!(message(OutputDir::create(&out)).contains(&holds));
+        fs::remove_dir_all(out.join(folder)).unwrap();
+    }
     fs::write(out.join(SCENE_FILE), "something else").unwrap();
     assert!(message(OutputDir::create(&out)).contains("not of an earlier build"));
     fs::remove_file(out.join(SCENE_FILE)).unwrap();

@@ -45,7 +45,7 @@ pub(crate) fn mesh() -> NodeMesh {
             NodeImage {
                 width: 2,
                 height: 1,
-                data: NodeImageData::Embedded { mime: "image/png", bytes: png() },
+                data: NodeImageData::Embedded { mime: "image/png", bytes: png(), file_name: None },
             },
             NodeImage {
                 width: 64,

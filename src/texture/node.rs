@@ -34,6 +34,14 @@ const MAX_SHARE: f64 = 4.0;
 /// Atlases with fewer texels than this are left as they are.
 const SMALL: usize = 64 * 64;
 
+/// A leaf embeds shared textures of at most this part of its own bytes. A coarser level has fewer
+/// bytes by about the ratio of its texels to the source's, so the part grows by that ratio: each
+/// level costs about as many bytes, and a view from afar, of few nodes, needs few files.
+const EMBEDDED_RATIO: f64 = 0.04;
+
+/// No node embeds shared textures of more than this part of its own bytes.
+const MAX_EMBEDDED_RATIO: f64 = 0.5;
+
 /// The skirts at the end of a node's mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AppendedSkirts {
@@ -125,6 +133,14 @@ impl BlockTextures<'_> {
         let mut node = NodeBuilder::new(self, &baked.mesh, self.nearest_level(level));
         node.baked = Some(baked);
         self.textured(node, skirts, origin)
+    }
+
+    /// Embeds the smallest of the shared textures of a node of a level, whose file has this many
+    /// bytes without them. Returns whether any was embedded.
+    pub fn embed_small(&self, mesh: &mut NodeMesh, file_bytes: usize, level: usize) -> bool {
+        let step = self.steps.get(self.nearest_level(level)).copied().unwrap_or(1.0);
+        let ratio = (EMBEDDED_RATIO * step * step).min(MAX_EMBEDDED_RATIO);
+        self.shared.embed(mesh, (file_bytes as f64 * ratio) as usize)
     }
 
     pub(super) fn nearest_level(&self, level: usize) -> usize {
@@ -499,7 +515,11 @@ impl<'a> NodeBuilder<'a> {
         Ok(NodeImage {
             width: page.size[0] as u32,
             height: page.size[1] as u32,
-            data: NodeImageData::Embedded { mime: encoded.mime, bytes: encoded.bytes },
+            data: NodeImageData::Embedded {
+                mime: encoded.mime,
+                bytes: encoded.bytes,
+                file_name: None,
+            },
         })
     }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use rustc_hash::FxHashMap;
 
 use super::node::NodeBuilder;
-use crate::format::{NodeImageData, Primitive, Surface};
+use crate::format::{Primitive, Surface};
 use crate::mesh::{AlphaMode, Wrap};
 
 /// What primitives are told apart by, besides their image.
@@ -106,13 +106,12 @@ impl NodeBuilder<'_> {
         (mode, cutoff, material.double_sided)
     }
 
-    /// The wrapping of a primitive: the material's where the image is shared; in atlases that of
-    /// the page.
+    /// The wrapping of a primitive: the material's where the image is a repeating texture; in
+    /// atlases that of the page.
     fn wrap(&self, material: u32, image: Option<usize>) -> [Wrap; 2] {
-        let shared = image
-            .is_some_and(|image| matches!(self.images[image].data, NodeImageData::Shared { .. }));
+        let repeats = image.is_some_and(|image| self.images[image].repeating().is_some());
         match self.block.model.materials.get(material as usize) {
-            Some(material) if shared => material.wrap,
+            Some(material) if repeats => material.wrap,
             _ if image.is_some_and(|image| !self.wrapping.contains(&image)) => [Wrap::Clamp; 2],
             _ => [Wrap::Repeat; 2],
         }

@@ -282,9 +282,11 @@ fn nodes(
     let block = BlockTextures::prepare(&cache, &shared, &scene.mesh, factors, options);
     let nodes = (0..factors.len())
         .map(|level| {
-            block
+            let node = block
                 .node_mesh(&scene.mesh, &AppendedSkirts::default(), level, [1.0, 2.0, 3.0])
-                .expect("builds")
+                .expect("builds");
+            shared.embed(&mut node.mesh.clone(), 0);
+            node
         })
         .collect();
     drop(block);

@@ -6,7 +6,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use hlod::city::{self, CityOptions};
-use hlod::format::Scene;
+use hlod::format::{Scene, TEXTURES_DIR};
 use hlod::mesh::UpAxis;
 use tempfile::TempDir;
 
@@ -265,8 +265,9 @@ fn shared_pictures_stay_while_anyone_uses_them() {
     let text = fs::read_to_string(folder.path().join("street.obj")).unwrap();
     write(folder.path(), "avenue.obj", &text);
     build(folder.path(), &["street.obj", "avenue.obj", "out"]);
-    let textures =
-        |out: &Path| contents(out).into_keys().filter(|name| name.starts_with("textures/")).count();
+    let textures = |out: &Path| {
+        contents(out).into_keys().filter(|name| name.starts_with(TEXTURES_DIR)).count()
+    };
     assert!(textures(&out) > 0, "the street's pictures repeat");
     write(folder.path(), "avenue.obj", format!("{text}\n# changed"));
     for arguments in [
@@ -326,8 +327,8 @@ fn a_damaged_result_is_built_again() {
             let bytes = fs::read(&path).unwrap();
             fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
         }),
-        ("a picture is missing", &|| fs::remove_file(some("textures/")).unwrap()),
-        ("a picture is empty", &|| fs::write(some("textures/"), "").unwrap()),
+        ("a picture is missing", &|| fs::remove_file(some(TEXTURES_DIR)).unwrap()),
+        ("a picture is empty", &|| fs::write(some(TEXTURES_DIR), "").unwrap()),
         ("the scene is cut", &|| {
             let bytes = fs::read(out.join("scene.hlod")).unwrap();
             fs::write(out.join("scene.hlod"), &bytes[..bytes.len() / 2]).unwrap();

@@ -10,7 +10,7 @@ use hlod::builder::BuildOptions;
 use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::city::{City, CityOptions, TextureSize, TileCode};
-use hlod::format::{NodeImageData, NodeMesh, file_crc};
+use hlod::format::{NODES_DIR, NodeImageData, NodeMesh, TEXTURES_DIR, file_crc};
 use hlod::mesh::Wrap;
 use hlod::report::BuildReport;
 use image::RgbImage;
@@ -151,7 +151,7 @@ fn check_pictures(what: &str, case: &Case, index: usize) {
             NodeImageData::Shared { file_name } => {
                 shared += texels;
                 names.insert(file_name.to_string());
-                image::open(case.out().join("textures").join(&**file_name)).unwrap()
+                image::open(case.out().join(TEXTURES_DIR).join(&**file_name)).unwrap()
             }
         };
         assert_eq!([decoded.width(), decoded.height()], [image.width, image.height], "{what}");
@@ -173,7 +173,7 @@ fn check_pictures(what: &str, case: &Case, index: usize) {
             continue;
         };
         used[image] = true;
-        if matches!(mesh.images[image].data, NodeImageData::Embedded { .. }) {
+        if mesh.images[image].repeating().is_none() {
             let inside = |uv: &[f32; 2]| uv.iter().all(|t| (0.0..=1.0).contains(t));
             // Charts may go on beyond the sides of an atlas whose opposite sides meet.
             assert!(
@@ -186,6 +186,32 @@ fn check_pictures(what: &str, case: &Case, index: usize) {
     assert!(used.iter().all(|&used| used), "{what}: a picture that nothing shows");
 }
 
+/// Nodes embed small repeating textures, for less than a tenth more bytes than where all were shared.
+#[test]
+fn small_repeating_textures_are_embedded_and_cost_little() {
+    let case = Case::new("street", &options(150), |folder| write_street(folder, 30));
+    let Built { scene, meshes, files } = &case.built;
+    let images = meshes.iter().flat_map(|mesh| &mesh.images);
+    let embedded: usize = images
+        .filter_map(|image| match &image.data {
+            NodeImageData::Embedded { bytes, file_name: Some(_), .. } => Some(bytes.len()),
+            _ => None,
+        })
+        .sum();
+    let shared: u64 = scene.shared_textures.iter().map(|texture| texture.bytes).sum();
+    let all = files.iter().map(Vec::len).sum::<usize>() + shared as usize;
+    assert!(embedded > 0 && shared > 0, "{embedded} and {shared} bytes");
+    assert!(10 * embedded < all - embedded, "{embedded} of {all} bytes");
+    // The coarsest level, which viewers load first, needs no file but its own.
+    let coarsest = scene.nodes.iter().filter(|node| node.level == 0);
+    assert!(coarsest.clone().all(|node| node.shared_textures.is_empty()));
+    assert!(coarsest.map(|node| node.pictures.len()).sum::<usize>() > 0);
+    // Some readers refuse to leave the folder of the file.
+    for file in files {
+        assert!(!file.windows(4).any(|part| part == b"\"../"));
+    }
+}
+
 #[test]
 fn the_files_are_those_of_the_scene_and_no_others() {
     for case in cases() {
@@ -194,22 +220,26 @@ fn the_files_are_those_of_the_scene_and_no_others() {
             ["scene.hlod", "build.json", "tileset.json"].map(String::from).into();
         expected.extend(scene.nodes.iter().map(|node| format!("nodes/{}", node.file)));
         expected.extend(
-            scene.shared_textures.iter().map(|texture| format!("textures/{}", texture.file_name)),
+            scene
+                .shared_textures
+                .iter()
+                .map(|texture| format!("{TEXTURES_DIR}/{}", texture.file_name)),
         );
         let found = contents(&case.out());
         assert_eq!(found.keys().cloned().collect::<BTreeSet<_>>(), expected, "{}", case.name);
         for texture in &scene.shared_textures {
-            let bytes = &found[&format!("textures/{}", texture.file_name)];
+            let bytes = &found[&format!("{TEXTURES_DIR}/{}", texture.file_name)];
             assert_eq!(texture.bytes, bytes.len() as u64);
         }
         let report: BuildReport = serde_json::from_slice(&found["build.json"]).unwrap();
         let in_folder = |folder: &str| -> u64 {
-            let files = found.iter().filter(|(name, _)| name.starts_with(folder));
+            let is_in = |name: &String| Path::new(name).parent() == Some(Path::new(folder));
+            let files = found.iter().filter(|(name, _)| is_in(name));
             files.map(|(_, bytes)| bytes.len() as u64).sum()
         };
         let of_levels: u64 = report.levels.iter().map(|level| level.bytes).sum();
-        assert_eq!(of_levels, in_folder("nodes/"), "{}", case.name);
-        assert_eq!(report.shared_textures.bytes, in_folder("textures/"), "{}", case.name);
+        assert_eq!(of_levels, in_folder(NODES_DIR), "{}", case.name);
+        assert_eq!(report.shared_textures.bytes, in_folder(TEXTURES_DIR), "{}", case.name);
         assert_eq!(report.shared_textures.files, scene.shared_textures.len() as u64);
         assert_eq!(scene.check(), []);
     }

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use hlod::city::{self, CityOptions};
-use hlod::format::{NODES_DIR, REPORT_FILE, SCENE_FILE, SUBSETS_DIR};
+use hlod::format::{NODES_DIR, REPORT_FILE, SCENE_FILE, SUBSETS_DIR, TEXTURES_DIR};
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
 use tempfile::TempDir;
@@ -68,7 +68,7 @@ fn textures_that_subsets_share_are_there_once() {
     }
     run_build(at, &["merge", "out"]);
     let [mut whole, mut out] = ["whole", "out"].map(|name| lasting(&at.join(name)));
-    assert!(whole.keys().any(|name| name.starts_with("textures/")), "{:?}", whole.keys());
+    assert!(whole.keys().any(|name| name.starts_with(TEXTURES_DIR)), "{:?}", whole.keys());
     // What both use counts for both.
     let texels = |name: &str| report(&at.join(name))["source_texels"].as_u64().unwrap();
     assert_eq!(texels("out"), 2 * texels("whole"));

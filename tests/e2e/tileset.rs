@@ -64,8 +64,9 @@ fn another_place_takes_over_all_nodes() {
     let out = folder.path().join("out");
     let inodes = || -> Vec<u64> {
         let nodes = fs::read_dir(out.join("nodes")).unwrap();
+        let files = nodes.map(|node| node.unwrap().metadata().unwrap());
         let mut inodes: Vec<u64> =
-            nodes.map(|node| node.unwrap().metadata().unwrap().ino()).collect();
+            files.filter(|file| file.is_file()).map(|file| file.ino()).collect();
         inodes.sort_unstable();
         inodes
     };

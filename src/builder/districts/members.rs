@@ -8,7 +8,9 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::builder::emit::disk_sink::NodeRecord;
-use crate::format::{NODES_DIR, NodeImageData, NodeMesh, Surface, TEXTURES_DIR, read_glb};
+use crate::format::{
+    NODES_DIR, NodeImage, NodeImageData, NodeMesh, Surface, TEXTURES_DIR, read_glb,
+};
 use crate::lattice::Lattice;
 use crate::mesh::{Group, Material, Model, Part, TextureData, TextureSource, Warnings, all_differ};
 use crate::{Error, Result};
@@ -42,7 +44,7 @@ pub fn read<'a>(
             warnings: Warnings::default(),
         },
         skirts: Vec::new(),
-        shared: BTreeMap::new(),
+        repeating: BTreeMap::new(),
     };
     for record in records {
         reader.add(record)?;
@@ -58,7 +60,9 @@ pub fn read_pictures<'a>(
 ) -> Result<()> {
     for record in records.filter(|record| !record.pictures.is_empty()) {
         for (number, image) in read_node(out, record)?.images.into_iter().enumerate() {
-            let NodeImageData::Embedded { bytes, .. } = image.data else { continue };
+            let NodeImageData::Embedded { bytes, file_name: None, .. } = image.data else {
+                continue;
+            };
             let name = name_of(&record.file, number);
             let texture = model.textures.iter_mut().find(|texture| texture.name == name);
             if let Some(texture) = texture {
@@ -86,8 +90,8 @@ struct Reader<'a> {
     lattice: Lattice,
     model: Model,
     skirts: Vec<Vec<DVec3>>,
-    /// The textures of the model that are shared between nodes, by name.
-    shared: BTreeMap<String, u32>,
+    /// The repeating textures of the model, by file name.
+    repeating: BTreeMap<String, u32>,
 }
 
 impl Reader<'_> {
@@ -96,7 +100,7 @@ impl Reader<'_> {
         let textures: Vec<u32> = images
             .into_iter()
             .enumerate()
-            .map(|(number, image)| self.texture(image.data, &record.file, number))
+            .map(|(number, image)| self.texture(image, &record.file, number))
             .collect();
         for primitive in primitives {
             let texture = primitive.surface.image.map(|image| textures[image]);
@@ -133,20 +137,27 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn texture(&mut self, data: NodeImageData, file: &str, number: usize) -> u32 {
+    /// The texture of an image; of a repeating one there is one, however many nodes have it.
+    fn texture(&mut self, image: NodeImage, file: &str, number: usize) -> u32 {
         let next = self.model.textures.len() as u32;
-        let (name, data) = match data {
-            NodeImageData::Embedded { .. } => {
-                (name_of(file, number), TextureData::Embedded(Arc::from([])))
+        let repeating = image.repeating().cloned();
+        if let Some(name) = &repeating {
+            let known = *self.repeating.entry(name.to_string()).or_insert(next);
+            if known != next {
+                return known;
             }
+        }
+        let data = match image.data {
+            // Read when it is needed: an atlas may be large.
+            NodeImageData::Embedded { file_name: None, .. } => TextureData::Embedded(Arc::from([])),
+            NodeImageData::Embedded { bytes, .. } => TextureData::Embedded(bytes.into()),
             NodeImageData::Shared { file_name } => {
-                let known = self.shared.entry(file_name.to_string()).or_insert(next);
-                if *known != next {
-                    return *known;
-                }
-                let path = self.out.join(TEXTURES_DIR).join(&*file_name);
-                (name_at_full_resolution(&file_name), TextureData::File(path))
+                TextureData::File(self.out.join(TEXTURES_DIR).join(&*file_name))
             }
+        };
+        let name = match repeating {
+            Some(name) => name_at_full_resolution(&name),
+            None => name_of(file, number),
         };
         self.model.textures.push(TextureSource { name, data, opacity: None });
         next
@@ -173,7 +184,7 @@ impl Reader<'_> {
     }
 }
 
-/// The name of a shared picture without what says how large it is, which it will say again.
+/// The file name of a repeating texture without what says how large it is, which it will say again.
 fn name_at_full_resolution(file_name: &str) -> String {
     let mut parts = file_name.rsplitn(3, '-');
     match (parts.next(), parts.next(), parts.next()) {

@@ -8,7 +8,7 @@ use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::{Stage, Stages};
 use crate::format::attributes::{Attributes, attributes};
 use crate::format::{
-    Encoding, NODES_DIR, NodeImageData, NodeLabel, OutputDir, file_crc, write_glb_encoded,
+    Encoding, NODES_DIR, NodeImageData, NodeLabel, NodeMesh, OutputDir, file_crc, write_glb_encoded,
 };
 use crate::mesh::{Kept, Mesh, UpAxis, Warnings};
 use crate::texture::{AppendedSkirts, BakeReason, BakedMesh, BlockTextures, TexturedNode};
@@ -117,7 +117,13 @@ impl NodeSink for DiskSink<'_> {
         self.stages.time(Stage::Write, || {
             let label = NodeLabel { id, level: node.level() as u32 };
             self.encoding.prepare(&mut mesh);
-            let bytes = write_glb_encoded(&mesh, self.up, label, self.encoding, self.copyright)?;
+            let write = |mesh: &NodeMesh| {
+                write_glb_encoded(mesh, self.up, label, self.encoding, self.copyright)
+            };
+            let mut bytes = write(&mesh)?;
+            if self.textures.embed_small(&mut mesh, bytes.len(), node.resolution) {
+                bytes = write(&mesh)?;
+            }
             self.out.write(format!("{NODES_DIR}/{file}"), &bytes)?;
             let attributes = attributes(&mesh, self.textured_weight);
             let pictures = mesh

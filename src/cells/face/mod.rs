@@ -85,7 +85,7 @@ impl Captured {
             image: NodeImage {
                 width: size[0],
                 height: size[1],
-                data: NodeImageData::Embedded { mime: "image/jpeg", bytes },
+                data: NodeImageData::Embedded { mime: "image/jpeg", bytes, file_name: None },
             },
             view: FaceView {
                 size,

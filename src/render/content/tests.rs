@@ -44,7 +44,11 @@ fn photograph(width: u32, height: u32) -> image::DynamicImage {
 
 fn jpeg(width: u32, height: u32) -> NodeImage {
     let bytes = encoded(&photograph(width, height), image::ImageFormat::Jpeg);
-    NodeImage { width, height, data: NodeImageData::Embedded { mime: "image/jpeg", bytes } }
+    NodeImage {
+        width,
+        height,
+        data: NodeImageData::Embedded { mime: "image/jpeg", bytes, file_name: None },
+    }
 }
 
 fn mesh() -> NodeMesh {
