@@ -134,8 +134,8 @@ impl UpEvidence {
             along.downward += (-projected).max(0.0);
             along.at_bottom += if is_at_bottom { (-projected).max(0.0) } else { 0.0 };
             let cosine = projected.abs() / area;
-            let is_at_right_angles = cosine < TOLERANCE || cosine > 1.0 - TOLERANCE;
-            along.at_right_angles += if is_at_right_angles { area } else { 0.0 };
+            let is_oblique = (TOLERANCE..=1.0 - TOLERANCE).contains(&cosine);
+            along.at_right_angles += if is_oblique { 0.0 } else { area };
         }
     }
 

@@ -75,7 +75,7 @@ fn the_up_axis_is_that_of_the_whole_file() {
         assert_eq!(whole, UpGuess { axis: up, is_clear: true });
         for vertices in [100, 1 << 20] {
             let dir = folder.path();
-            let tiling = Tiling::of(&path, bounds, None, vertices, dir, &CpuTime::default());
+            let tiling = Tiling::of(&path, bounds, None, vertices, dir);
             let tiling = tiling.unwrap();
             assert_eq!(tiling.up(), up);
             assert_eq!(tiling.tiles() > 1, vertices == 100);
