@@ -69,6 +69,7 @@ fn node_file() -> Vec<u8> {
             texcoords: vec![[0.0; 2]; 4],
             colors: vec![[1; 4]; 4],
             indices: vec![0, 1, 2, 0, 2, 3],
+            normals: Vec::new(),
             skirt_triangles: 0,
             surface: Surface {
                 base_color: [1.0; 4],

@@ -7,7 +7,7 @@ use hlod::format::{
     BlockInfo, Node, NodeImage, NodeImageData, NodeLabel, NodeMesh, Primitive, Scene,
     SharedTexture, Surface, read_glb, write_glb,
 };
-use hlod::mesh::{AlphaMode, UpAxis, Wrap};
+use hlod::mesh::{AlphaMode, Normal, UpAxis, Wrap};
 use hlod::report::inspect;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -143,10 +143,23 @@ prop_compose! {
         texcoords in vec([finite(), finite()], if surface.image.is_some() { vertices } else { 0 }),
         colors in prop_oneof![vec(any::<[u16; 4]>(), vertices), Just(vec![])],
         indices in vec(any::<[prop::sample::Index; 3]>(), 1..30),
+        directions in vec([-1.0..1.0f64, -1.0..1.0, 0.5..1.0], 90),
         surface in Just(surface),
     ) -> Primitive {
+        // Files of textured primitives have no normals, and those of others no equal vertices in a row.
+        let is_lit = surface.image.is_none() && positions.windows(2).all(|pair| pair[0] != pair[1]);
+        let corners = if is_lit { 3 * indices.len() } else { 0 };
+        let normals = directions.iter().map(|&direction| Normal::along(direction.into()));
         let indices = indices.as_flattened().iter().map(|i| i.index(positions.len()) as u32);
-        Primitive { skirt_triangles: 0, indices: indices.collect(), positions, texcoords, colors, surface }
+        Primitive {
+            indices: indices.collect(),
+            normals: normals.take(corners).collect(),
+            skirt_triangles: 0,
+            positions,
+            texcoords,
+            colors,
+            surface,
+        }
     }
 }
 

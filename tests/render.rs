@@ -73,6 +73,7 @@ fn rectangle(
         },
         colors: Vec::new(),
         indices: vec![0, 1, 2, 0, 2, 3],
+        normals: Vec::new(),
         skirt_triangles: 0,
         surface,
     }

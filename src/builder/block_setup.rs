@@ -109,6 +109,7 @@ impl<'a> BlockSetup<'a> {
             jpeg_quality: options.jpeg_quality,
             max_atlas: options.max_atlas,
             seams: options.hierarchy.seams,
+            normals: options.normals,
             root_triangles: (mesh.triangles.len() as f64 / factors[0]) as usize,
         };
         stages.time(Stage::Pictures, || {

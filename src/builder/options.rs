@@ -34,6 +34,8 @@ pub struct BuildOptions {
     pub quantize: Option<f64>,
     /// Compress vertices and indices without loss.
     pub compress: bool,
+    /// Write normals for triangles without a texture.
+    pub normals: bool,
     /// Weight of textured triangles in the cost (`c_textured`), 0–1.
     pub textured_weight: f64,
     /// Whether there are nodes above the blocks ([`crate::builder::districts`]).
@@ -62,6 +64,7 @@ impl Default for BuildOptions {
             max_atlas: 4096,
             quantize: None,
             compress: false,
+            normals: true,
             textured_weight: crate::format::attributes::TEXTURED_WEIGHT,
             districts: true,
             max_memory: None,
@@ -119,7 +122,8 @@ impl BuildOptions {
             "jpeg_quality": self.jpeg_quality,
             "max_atlas": self.max_atlas,
             "textured_weight": self.textured_weight,
-            "districts": if self.districts { "on" } else { "off" },
+            "normals": on_off(self.normals),
+            "districts": on_off(self.districts),
         });
         if let Some(quantization) = self.quantization() {
             quantization.note(&mut parameters);
@@ -157,7 +161,6 @@ impl BuildOptions {
             ..HierarchyOptions::default()
         };
         let blocks: String = read(parameters, "blocks")?;
-        let districts: String = read(parameters, "districts")?;
         let options = Self {
             hierarchy,
             blocks: blocks.parse().map_err(|what| unknown("blocks", &what))?,
@@ -168,8 +171,9 @@ impl BuildOptions {
             max_atlas: read(parameters, "max_atlas")?,
             quantize: Quantization::of(parameters).map(|quantization| quantization.step),
             compress: parameters.get("compress").is_some(),
+            normals: read_on_off(parameters, "normals")?,
             textured_weight: read(parameters, "textured_weight")?,
-            districts: districts == "on",
+            districts: read_on_off(parameters, "districts")?,
             // Tiles do not depend on how much it is.
             max_memory: parameters.get(TILES).map(|_| u64::MAX),
             resume: false,
@@ -188,6 +192,19 @@ const TILES: &str = "tile_vertices";
 
 fn read<T: serde::de::DeserializeOwned>(parameters: &serde_json::Value, name: &str) -> Result<T> {
     T::deserialize(&parameters[name]).map_err(|error| unknown(name, &error))
+}
+
+/// How a switch is written among the parameters.
+fn on_off(is_on: bool) -> &'static str {
+    if is_on { "on" } else { "off" }
+}
+
+fn read_on_off(parameters: &serde_json::Value, name: &str) -> Result<bool> {
+    match read::<String>(parameters, name)?.as_str() {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        other => Err(unknown(name, &format!("expected on or off, found {other:?}"))),
+    }
 }
 
 fn unknown(name: &str, what: &dyn std::fmt::Display) -> Error {
@@ -235,6 +252,7 @@ mod tests {
             max_atlas: 777,
             quantize: Some(0.01),
             compress: true,
+            normals: false,
             districts: false,
             max_memory: Some(LEAST_MEMORY),
             ..BuildOptions::default()

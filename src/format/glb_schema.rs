@@ -10,6 +10,7 @@ pub(super) const CHUNK_JSON: u32 = 0x4E4F_534A;
 /// `BIN` and a zero as little-endian u32.
 pub(super) const CHUNK_BIN: u32 = 0x004E_4942;
 
+pub(super) const BYTE: u32 = 5120;
 pub(super) const UNSIGNED_SHORT: u32 = 5123;
 pub(super) const UNSIGNED_INT: u32 = 5125;
 pub(super) const FLOAT: u32 = 5126;
@@ -131,6 +132,8 @@ pub(super) struct PrimitiveExtras {
 pub(super) struct Attributes {
     #[serde(rename = "POSITION")]
     pub position: usize,
+    #[serde(rename = "NORMAL", skip_serializing_if = "Option::is_none")]
+    pub normal: Option<usize>,
     #[serde(rename = "TEXCOORD_0", skip_serializing_if = "Option::is_none")]
     pub texcoord: Option<usize>,
     #[serde(rename = "COLOR_0", skip_serializing_if = "Option::is_none")]

@@ -1,13 +1,14 @@
 //! Writes a node as GLB, the binary form of glTF 2.0.
 
 use super::TEXTURES_URI;
+use super::corner_normals::divide_vertices;
 use super::encoding::Encoding;
 use super::file_name::is_plain_file_name;
 use super::glb_packed::{encode_triangles, encode_vertices};
 use super::glb_schema::{self as schema, *};
 use super::node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 use super::quantized::{in_shares, in_steps, is_in_steps};
-use crate::mesh::{AlphaMode, UpAxis, Wrap};
+use crate::mesh::{AlphaMode, Normal, UpAxis, Wrap};
 use crate::{Error, Result};
 
 /// Where a node stands in its scene; goes into the file for people and tools.
@@ -23,8 +24,8 @@ pub struct NodeLabel {
 /// The bytes of a node's file. They depend on the arguments and this crate's version alone.
 ///
 /// glTF is Y up: where `up` is Z the node's transform turns it, and the vertices stay in source
-/// axes. Surfaces with a picture are unlit, since photographs hold their light; others are lit,
-/// flat for want of normals. The wrapping of a surface without a picture is not kept. A mesh
+/// axes. Surfaces with a picture are unlit, since photographs hold their light; others are lit. The
+/// wrapping of a surface without a picture is not kept. A mesh
 /// without primitives is a file without geometry.
 ///
 /// Fails where the mesh breaks its own promises: arrays of different lengths, indices out of
@@ -96,7 +97,10 @@ fn bin_size(mesh: &NodeMesh) -> usize {
         .primitives
         .iter()
         .map(|p| {
-            12 * p.positions.len() + 8 * (p.texcoords.len() + p.colors.len()) + 4 * p.indices.len()
+            // Corners of three faces at a vertex, each with a normal of its own, are usual.
+            let vertices = if p.normals.is_empty() { 1 } else { 3 };
+            vertices * (12 * p.positions.len() + 8 * (p.texcoords.len() + p.colors.len()))
+                + 4 * (p.indices.len() + p.normals.len())
         })
         .sum();
     let pictures: usize = mesh
@@ -143,7 +147,8 @@ fn placement(
 
 /// What glTF and [`NodeMesh`] demand of a primitive.
 fn check(primitive: &Primitive, images: usize) -> Result<(), String> {
-    let Primitive { positions, texcoords, colors, indices, skirt_triangles, surface } = primitive;
+    let Primitive { positions, texcoords, colors, normals, indices, skirt_triangles, surface } =
+        primitive;
     let vertices = positions.len();
     if vertices == 0 || indices.is_empty() || !indices.len().is_multiple_of(3) {
         return Err(format!("expected whole triangles, found {} corners", indices.len()));
@@ -156,6 +161,10 @@ fn check(primitive: &Primitive, images: usize) -> Result<(), String> {
         if length != 0 && length != vertices {
             return Err(format!("{name}: expected {vertices} or none, found {length}"));
         }
+    }
+    if !normals.is_empty() && normals.len() != indices.len() {
+        let (expected, found) = (indices.len(), normals.len());
+        return Err(format!("normals: expected {expected} or none, found {found}"));
     }
     if let Some(&found) = indices.iter().find(|&&index| index as usize >= vertices) {
         return Err(format!("expected indices below {vertices}, found {found}"));
@@ -194,10 +203,16 @@ struct Writer {
 
 impl Writer {
     fn primitive(&mut self, primitive: &Primitive) -> schema::Primitive {
-        let Primitive { positions, texcoords, colors, indices, skirt_triangles, surface } =
+        let divided = (!primitive.normals.is_empty()).then(|| divide_vertices(primitive));
+        let (primitive, normals) = match &divided {
+            Some((primitive, normals)) => (primitive, &normals[..]),
+            None => (primitive, &[][..]),
+        };
+        let Primitive { positions, texcoords, colors, indices, skirt_triangles, surface, .. } =
             primitive;
         let vertices = positions.len();
         let position = self.positions(positions);
+        let normal = (!normals.is_empty()).then(|| self.normals(normals));
         let texcoord = (!texcoords.is_empty()).then(|| self.texcoords(texcoords));
         let color = (!colors.is_empty()).then(|| {
             let accessor = self.vertices(vertices, UNSIGNED_SHORT, Shape::Vec4, 8, |bin| {
@@ -226,7 +241,7 @@ impl Writer {
         let extras = (*skirt_triangles > 0)
             .then_some(schema::PrimitiveExtras { skirt_triangles: *skirt_triangles });
         schema::Primitive {
-            attributes: Attributes { position, texcoord, color },
+            attributes: Attributes { position, normal, texcoord, color },
             indices,
             material,
             extras,
@@ -264,6 +279,33 @@ impl Writer {
         accessor
     }
 
+    /// Unit vectors: in 8 bits beside positions in steps, in 32 bits elsewhere.
+    fn normals(&mut self, normals: &[Normal]) -> usize {
+        // glTF wants a unit vector of each vertex, of those without a direction too.
+        let up = Normal::along(glam::DVec3::Z);
+        let normals =
+            normals.iter().map(|&normal| if normal == Normal::NONE { up } else { normal });
+        if self.steps.is_some() {
+            let short: Vec<[i8; 4]> = normals
+                .map(|normal| {
+                    let [x, y, z] = normal.to_8_bits();
+                    [x, y, z, 0]
+                })
+                .collect();
+            let accessor = self.vertices(short.len(), BYTE, Shape::Vec3, 4, |bin| {
+                extend(bin, short.as_flattened(), i8::to_le_bytes);
+            });
+            self.root.accessors[accessor].normalized = true;
+            return accessor;
+        }
+        let long: Vec<[f32; 3]> = normals
+            .map(|normal| normal.vector().unwrap_or_default().as_vec3().to_array())
+            .collect();
+        self.vertices(long.len(), FLOAT, Shape::Vec3, 12, |bin| {
+            extend(bin, long.as_flattened(), f32::to_le_bytes);
+        })
+    }
+
     fn texcoords(&mut self, texcoords: &[[f32; 2]]) -> usize {
         let Some(shares) = self.short_texcoords.then(|| in_shares(texcoords)).flatten() else {
             return self.vertices(texcoords.len(), FLOAT, Shape::Vec2, 8, |bin| {
@@ -297,8 +339,8 @@ impl Writer {
         } else {
             self.accessor(count, component_type, shape, fill)
         };
-        // Without a stride vertices follow each other closely: true but of those in steps.
-        if (component_type, shape) == (UNSIGNED_SHORT, Shape::Vec3) {
+        // Without a stride vertices follow each other closely: not those of three short numbers.
+        if shape == Shape::Vec3 && component_type != FLOAT {
             let view = self.root.accessors[accessor].buffer_view;
             self.root.buffer_views[view].byte_stride = Some(stride);
         }

@@ -16,6 +16,7 @@ pub mod attributes;
 mod breadth_first;
 mod bytes;
 pub mod cells;
+mod corner_normals;
 mod encoding;
 mod file_name;
 mod glb_packed;
@@ -47,7 +48,7 @@ mod viewer_error;
 
 pub use encoding::Encoding;
 pub use file_name::is_plain_file_name;
-pub use glb_read::read_glb;
+pub use glb_read::{read_glb, read_glb_without_normals};
 pub use glb_write::{NodeLabel, write_glb, write_glb_encoded};
 pub use node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 pub(crate) use output_dir::resolve;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::mesh::{AlphaMode, Wrap};
+use crate::mesh::{AlphaMode, Normal, Wrap};
 
 /// A picture of a node, already encoded.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +69,9 @@ pub struct Primitive {
     pub texcoords: Vec<[f32; 2]>,
     /// One per vertex, or empty. RGBA, linear, 65535 is 1.
     pub colors: Vec<[u16; 4]>,
+    /// One per corner of [`Self::indices`], or empty. A file has one per vertex: vertices whose corners
+    /// have several are divided when it is written, and joined again when it is read.
+    pub normals: Vec<Normal>,
     /// Three per triangle.
     pub indices: Vec<u32>,
     /// The last so many triangles are skirts: no part of the surface, but in a cutting plane, where

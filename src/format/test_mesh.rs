@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
-use crate::mesh::{AlphaMode, Wrap};
+use crate::mesh::{AlphaMode, Normal, Wrap};
 
 /// A PNG of 2 × 1 opaque texels.
 pub(crate) fn png() -> Vec<u8> {
@@ -14,11 +14,16 @@ pub(crate) fn png() -> Vec<u8> {
 }
 
 /// Four primitives: own picture, shared picture with a cut-out, colours, and plain like the
-/// third.
+/// third; the last two have normals.
 pub(crate) fn mesh() -> NodeMesh {
     let square = vec![[0.0, 0.0, 0.125], [1.0, -0.0, 0.1], [1.0, 1.0, -3.25], [0.0, 1.0, 1e-7]];
     let texcoords = vec![[0.0, 0.0], [2.5, 0.1], [2.5, -1.0], [0.0, 1.0 / 3.0]];
     let indices = vec![0, 1, 2, 0, 2, 3];
+    // Both vertices of the edge between the triangles have two normals.
+    let folded = [[0.0, 0.0, 1.0], [0.5, -0.25, -0.75]]
+        .into_iter()
+        .flat_map(|normal| [Normal::along(normal.into()); 3])
+        .collect();
     let plain = Surface {
         base_color: [0.1, 0.2, 1.0 / 3.0, 1.0],
         image: None,
@@ -59,6 +64,7 @@ pub(crate) fn mesh() -> NodeMesh {
                 texcoords: texcoords.clone(),
                 colors: vec![],
                 indices: indices.clone(),
+                normals: Vec::new(),
                 skirt_triangles: 0,
                 surface: photograph,
             },
@@ -67,6 +73,7 @@ pub(crate) fn mesh() -> NodeMesh {
                 texcoords,
                 colors: vec![[65535, 0, 1, 65535]; 4],
                 indices: indices.clone(),
+                normals: Vec::new(),
                 skirt_triangles: 0,
                 surface: fence,
             },
@@ -75,6 +82,7 @@ pub(crate) fn mesh() -> NodeMesh {
                 texcoords: vec![],
                 colors: vec![[1, 2, 3, 65535]; 4],
                 indices: indices.clone(),
+                normals: folded,
                 skirt_triangles: 0,
                 surface: plain.clone(),
             },
@@ -83,6 +91,7 @@ pub(crate) fn mesh() -> NodeMesh {
                 texcoords: vec![],
                 colors: vec![],
                 indices: vec![2, 1, 0],
+                normals: vec![Normal::along(glam::DVec3::NEG_X); 3],
                 skirt_triangles: 0,
                 surface: plain,
             },

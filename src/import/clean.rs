@@ -23,6 +23,8 @@ pub(super) struct CleanStats {
     pub(super) texcoords_not_finite: u64,
     /// Vertex colours with a component out of range.
     pub(super) colors_clamped: u64,
+    /// Normals that have no direction, or point to the back of their face.
+    pub(super) normals_dropped: u64,
     /// Vertices that no face uses.
     pub(super) unused_vertices: u64,
 }
@@ -38,6 +40,7 @@ impl CleanStats {
         self.untextured_faces += other.untextured_faces;
         self.texcoords_not_finite += other.texcoords_not_finite;
         self.colors_clamped += other.colors_clamped;
+        self.normals_dropped += other.normals_dropped;
         self.unused_vertices += other.unused_vertices;
     }
 
@@ -53,6 +56,10 @@ impl CleanStats {
         add("textured face without texture coordinates, set to 0", self.untextured_faces);
         add("texture coordinate that is not finite, set to 0", self.texcoords_not_finite);
         add("vertex colour out of range, clamped", self.colors_clamped);
+        add(
+            "normal without a direction or to the back of its face, replaced by the face's",
+            self.normals_dropped,
+        );
         add("vertex that no face uses, ignored", self.unused_vertices);
     }
 }
@@ -175,6 +182,7 @@ pub(super) fn drop_unused_vertices(part: &mut Part) {
     compact(&mut part.positions, &new_index);
     compact(&mut part.texcoords, &new_index);
     compact(&mut part.colors, &new_index);
+    compact(&mut part.normals, &new_index);
 }
 
 /// Keeps the elements that have a new index; an empty (absent) attribute stays empty.

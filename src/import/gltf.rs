@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 
-use glam::{DMat4, DQuat, DVec3};
+use glam::{DMat3, DMat4, DQuat, DVec3};
+use gltf_json::accessor::ComponentType;
 use gltf_json::mesh::{Mode, Primitive, Semantic};
 use gltf_json::validation::Checked;
 use gltf_json::{Index, Root};
@@ -19,7 +20,7 @@ use super::gltf_unread;
 use super::paths::Finder;
 use super::vertices::NONE;
 use crate::color::unorm16;
-use crate::mesh::{Group, Model, Part, UpAxis, Warnings};
+use crate::mesh::{Group, Model, Normal, Part, SAME_NORMAL, UpAxis, Warnings};
 use crate::{Error, Result};
 
 /// Bytes of a GLB before its JSON: its header and that of the first chunk.
@@ -30,6 +31,10 @@ const MOST_REPEATED_TRIANGLES: u64 = 1 << 26;
 
 /// Triangles that take as much memory as a part has beside them.
 const PART_TRIANGLES: u64 = 8;
+
+/// Normals of 8 bits that are closer than this are the same: the cosine of 1.2°, twice what they are
+/// rounded by.
+const SAME_ROUNDED_NORMAL: f64 = 0.999_78;
 
 /// Reads the glTF or GLB at `path`.
 pub(super) fn load(path: &Path) -> Result<Model> {
@@ -206,6 +211,8 @@ struct Decoded {
     texcoords: Vec<[f32; 2]>,
     /// One per position.
     colors: Option<Vec<[u16; 4]>>,
+    /// One per position, where the material has no texture: what has one is not lit.
+    normals: Option<Vec<[f64; 3]>>,
 }
 
 impl Scene<'_> {
@@ -243,9 +250,11 @@ impl Scene<'_> {
         let node = self.root.nodes.get(placement.node).and_then(|node| node.name.clone());
         let name = [node, mesh.name.clone()].into_iter().flatten().find(|name| !name.is_empty());
         let name = name.unwrap_or_else(|| super::stem(self.path));
+        let plane = self.plane_cosine(mesh);
         for mut parts in instances {
             for part in &mut parts {
                 part.group = self.groups.len() as u32;
+                self.stats.normals_dropped += divide_normals(part, plane);
                 clean(part, &mut self.stats);
             }
             parts.retain(|part| !part.indices.is_empty());
@@ -366,8 +375,24 @@ impl Scene<'_> {
             self.stats.untextured_faces += corners.len() as u64 / 3;
         }
 
+        let normals: Option<Vectors<3>> = match attribute(Semantic::Normals) {
+            Some(accessor) if !textured => {
+                let normals = self.buffers.vector_elements(accessor).ok();
+                let normals = normals.filter(|normals: &Vectors<3>| normals.len() == count);
+                let lost = if normals.is_none() { corners.len() } else { 0 };
+                self.stats.normals_dropped += lost as u64;
+                normals
+            }
+            _ => None,
+        };
+
         // Only what the triangles use: primitives often share accessors much larger than they.
         let used = compact(&mut corners, &mut self.numbers);
+        let normals: Option<Vec<[f64; 3]>> = normals
+            .map(|normals| used.iter().map(|vertex| normals.get(*vertex as usize)).collect());
+        let has_none = |vector: &&[f64; 3]| Normal::along(DVec3::from(**vector)) == Normal::NONE;
+        let nowhere = normals.iter().flatten().filter(has_none).count();
+        self.stats.normals_dropped += nowhere as u64;
         let mut texcoord = |vertex: &u32| {
             let Some(texcoords) = &texcoords else { return [0.0; 2] };
             let uv = made.transform.apply(texcoords.get(*vertex as usize));
@@ -384,7 +409,22 @@ impl Scene<'_> {
             },
             colors: colors
                 .map(|colors| used.iter().map(|vertex| colors.get(*vertex as usize)).collect()),
+            normals,
         }))
+    }
+
+    /// The cosine of the angle within which normals of a mesh are those of their triangles' planes.
+    fn plane_cosine(&self, mesh: &gltf_json::Mesh) -> f64 {
+        let is_float = |primitive: &Primitive| {
+            let accessor = primitive.attributes.get(&Checked::Valid(Semantic::Normals))?;
+            let accessor = self.root.accessors.get(accessor.value())?;
+            match accessor.component_type {
+                Checked::Valid(kind) => Some(kind.0 == ComponentType::F32),
+                Checked::Invalid => None,
+            }
+        };
+        let is_rounded = mesh.primitives.iter().any(|primitive| is_float(primitive) == Some(false));
+        if is_rounded { SAME_ROUNDED_NORMAL } else { SAME_NORMAL }
     }
 }
 
@@ -441,7 +481,7 @@ fn compact(corners: &mut [u32], numbers: &mut Vec<u32>) -> Vec<u32> {
 
 /// Adds a primitive's triangles and vertices to `part`.
 fn append(part: &mut Part, primitive: &Decoded, world: &DMat4) -> Result<(), String> {
-    let Decoded { positions, corners, texcoords, colors } = primitive;
+    let Decoded { positions, corners, texcoords, colors, normals } = primitive;
     let first = part.positions.len();
     let vertices = first + positions.len();
     if vertices >= NONE as usize {
@@ -457,12 +497,33 @@ fn append(part: &mut Part, primitive: &Decoded, world: &DMat4) -> Result<(), Str
     } else if !part.colors.is_empty() {
         part.colors.resize(vertices, white);
     }
+    if let Some(normals) = normals {
+        // Normals of a surface that is stretched turn against the stretch. Not finite where it is
+        // pressed flat, which leaves no normal.
+        let turn = DMat3::from_mat4(*world).inverse().transpose();
+        part.normals.resize(first, Normal::NONE);
+        part.normals
+            .extend(normals.iter().map(|&normal| Normal::along(turn * DVec3::from(normal))));
+    } else if !part.normals.is_empty() {
+        part.normals.resize(vertices, Normal::NONE);
+    }
     // A mirrored mesh shows its triangles from behind.
     let order = if world.determinant() < 0.0 { [0, 2, 1] } else { [0, 1, 2] };
     for triangle in corners.as_chunks::<3>().0 {
         part.indices.extend(order.map(|corner| first as u32 + triangle[corner]));
     }
     Ok(())
+}
+
+/// Leaves out normals that say nothing; returns how many were wrong. Those within an angle of their
+/// triangle's, whose cosine is `plane`, are the triangle's.
+fn divide_normals(part: &mut Part, plane: f64) -> u64 {
+    let normals = std::mem::take(&mut part.normals);
+    if normals.is_empty() {
+        return 0;
+    }
+    let corners = part.indices.iter().map(|&vertex| normals[vertex as usize]).collect();
+    part.set_normals(corners, plane)
 }
 
 /// Corners in the order of a list of triangles (glTF 2.0, section 3.7.2.1); a rest is dropped.

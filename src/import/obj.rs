@@ -40,9 +40,9 @@ use super::paged::Paged;
 use super::paths::Finder;
 use super::plain_text::PlainText;
 use super::textures::{OpacityCache, Textures};
-use super::vertices::{Numbered, Unifier};
+use super::vertices::{NONE, Numbered, Unifier};
 use super::words::Words;
-use crate::mesh::{Group, Model, Part, Warnings};
+use crate::mesh::{Group, Model, Normal, Part, SAME_NORMAL, Warnings};
 use crate::stage_timer::StageTimer;
 use crate::{Error, Result};
 
@@ -141,6 +141,8 @@ impl Batch {
 #[derive(Default)]
 struct PartState {
     part: Part,
+    /// Of its corners; fewer where the last have none.
+    normals: Vec<Normal>,
     /// Faces without texture coordinates.
     bare_faces: u64,
 }
@@ -186,6 +188,7 @@ struct Obj<'a> {
     colors: Paged<[u16; 4]>,
     color_range: ColorRange,
     texcoords: Paged<[f64; 2]>,
+    normals: Paged<Normal>,
 
     /// The names of the groups, as the file gives them.
     groups: Vec<Vec<u8>>,
@@ -218,8 +221,8 @@ struct Placing {
 struct Placed {
     statements: Statements,
     runs: Vec<Run>,
-    /// How many positions and texture coordinates come before it.
-    before: [usize; 2],
+    /// How many positions, texture coordinates and normals come before it.
+    before: [usize; 3],
 }
 
 impl<'a> Obj<'a> {
@@ -246,6 +249,7 @@ impl<'a> Obj<'a> {
             colors: Paged::default(),
             color_range: ColorRange::default(),
             texcoords: Paged::default(),
+            normals: Paged::default(),
             groups: Vec::new(),
             group_name: super::stem(path).into_bytes(),
             group: None,
@@ -259,14 +263,18 @@ impl<'a> Obj<'a> {
 
     /// Adds the chunks that come next.
     fn add(&mut self, mut parsed: Vec<Parsed>) -> Result<(), String> {
-        let mut before = [self.positions.len(), self.texcoords.len()];
-        let chunk_starts: Vec<[usize; 2]> = parsed
+        let mut before = self.counts();
+        let chunk_starts: Vec<[usize; 3]> = parsed
             .iter()
-            .map(|Parsed { statements, .. }| {
-                let counts = [statements.positions.len(), statements.texcoords.len()];
-                let next = [0, 1].map(|kind| before[kind] + counts[kind]);
-                std::mem::replace(&mut before, next)
-            })
+            .map(
+                |Parsed {
+                     statements: Statements { positions, texcoords, normals, .. }, ..
+                 }| {
+                    let counts = [positions.len(), texcoords.len(), normals.len()];
+                    let next = [0, 1, 2].map(|kind| before[kind] + counts[kind]);
+                    std::mem::replace(&mut before, next)
+                },
+            )
             .collect();
         let timer = StageTimer::current();
         parsed.par_iter_mut().zip(chunk_starts).for_each(|(chunk, before)| {
@@ -286,9 +294,14 @@ impl<'a> Obj<'a> {
         triangles.into_iter().try_for_each(|chunk| self.join(chunk))
     }
 
+    /// How many positions, texture coordinates and normals there are so far.
+    fn counts(&self) -> [usize; 3] {
+        [self.positions.len(), self.texcoords.len(), self.normals.len()]
+    }
+
     /// Settles what a chunk's indices mean and to which parts its faces belong.
     fn place(&mut self, Parsed { statements: mut chunk, .. }: Parsed) -> Result<Placed, String> {
-        let before = [self.positions.len(), self.texcoords.len()];
+        let before = self.counts();
         chunk.check(before, self.lines)?;
         self.index_faults.add(&chunk.index_faults, self.lines);
         self.lines += chunk.lines;
@@ -296,6 +309,7 @@ impl<'a> Obj<'a> {
         self.add_colors(&mut chunk, before[0]);
         self.positions.extend(std::mem::take(&mut chunk.positions));
         self.texcoords.extend(std::mem::take(&mut chunk.texcoords));
+        self.normals.extend(std::mem::take(&mut chunk.normals));
         let mut runs = Vec::with_capacity(chunk.changes.len() + 1);
         let mut placing =
             Placing { first: 0, corner_face: 0, corner: 0, texcoords_before: before[1] };
@@ -351,8 +365,9 @@ impl<'a> Obj<'a> {
             return;
         }
         // Texture coordinates stay with a material that may yet turn out to have a texture.
-        let textured = used.material.material.texture.is_some() || !used.defined;
-        runs.push(Run { faces, part, textured });
+        let lit = used.material.material.texture.is_none();
+        let textured = !lit || !used.defined;
+        runs.push(Run { faces, part, textured, lit });
     }
 
     /// Appends faces of a material whose textures are UDIM tiles to `runs`: each is of the material
@@ -375,7 +390,7 @@ impl<'a> Obj<'a> {
             let count = chunk.faces[face] as usize;
             let corners = &chunk.corners[placing.corner..placing.corner + count];
             placing.corner += count;
-            let texcoords = corners.iter().filter_map(|[_, texcoord]| {
+            let texcoords = corners.iter().filter_map(|[_, texcoord, _]| {
                 let texcoord = texcoord.resolve(placing.texcoords_before)?;
                 self.texcoords.get(texcoord as usize).copied()
             });
@@ -395,7 +410,7 @@ impl<'a> Obj<'a> {
                     let part = self.part_of(of_tile);
                     let textured =
                         self.materials[of_tile as usize].material.material.texture.is_some();
-                    runs.push(Run { faces: face..face + 1, part, textured });
+                    runs.push(Run { faces: face..face + 1, part, textured, lit: !textured });
                     part
                 }
             };
@@ -437,6 +452,15 @@ impl<'a> Obj<'a> {
             let state = &mut self.parts[part as usize];
             state.bare_faces += bare_faces;
             let indices = &chunk.indices[first..end];
+            let normals = chunk.normals.get(first..end).unwrap_or(&[]);
+            if normals.iter().any(|&normal| normal != NONE) {
+                state.normals.resize(state.part.indices.len(), Normal::NONE);
+                let normal = |&number: &u32| self.normals.get(number as usize).copied();
+                let known = normals.iter().map(normal);
+                let nowhere = known.clone().filter(|normal| *normal == Some(Normal::NONE));
+                self.stats.normals_dropped += nowhere.count() as u64;
+                state.normals.extend(known.map(Option::unwrap_or_default));
+            }
             state.part.indices.extend(indices.iter().map(|&index| vertices[index as usize]));
             first = end;
         }
@@ -508,7 +532,7 @@ impl<'a> Obj<'a> {
         let parts = &mut self.parts;
         *self.part_of.entry((group, material)).or_insert_with(|| {
             let part = Part { group, material, ..Part::default() };
-            parts.push(PartState { part, bare_faces: 0 });
+            parts.push(PartState { part, ..PartState::default() });
             parts.len() as u32 - 1
         })
     }
@@ -763,12 +787,18 @@ fn push<T>(elements: &mut Vec<T>, count: usize, element: T) {
 }
 
 /// A part as it will stay, and what was left out.
-fn finished(PartState { mut part, bare_faces }: PartState) -> (Part, CleanStats) {
+fn finished(PartState { mut part, mut normals, bare_faces }: PartState) -> (Part, CleanStats) {
     let mut stats = CleanStats { untextured_faces: bare_faces, ..CleanStats::default() };
+    // A material may have turned out to have a texture; then it is not lit.
+    if part.texcoords.is_empty() && !normals.is_empty() {
+        normals.resize(part.indices.len(), Normal::NONE);
+        stats.normals_dropped = part.set_normals(normals, SAME_NORMAL);
+    }
     clean(&mut part, &mut stats);
     part.positions.shrink_to_fit();
     part.texcoords.shrink_to_fit();
     part.colors.shrink_to_fit();
+    part.normals.shrink_to_fit();
     part.indices.shrink_to_fit();
     (part, stats)
 }

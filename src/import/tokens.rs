@@ -89,9 +89,10 @@ pub(super) const NO_ELEMENT: i64 = -(1 << 60);
 pub(super) struct Corner {
     pub(super) position: i64,
     pub(super) texcoord: i64,
+    pub(super) normal: i64,
 }
 
-/// Reads a face's corner. `None` where it is none. Normals are checked for form and left.
+/// Reads a face's corner. `None` where it is none.
 #[inline]
 pub(super) fn corner(word: &[u8]) -> Option<Corner> {
     corner_at(word).filter(|(_, rest)| rest.is_empty()).map(|(corner, _)| corner)
@@ -102,7 +103,7 @@ pub(super) fn corner(word: &[u8]) -> Option<Corner> {
 #[inline]
 pub(super) fn corner_at(bytes: &[u8]) -> Option<(Corner, &[u8])> {
     let (position, mut rest) = index(bytes)?;
-    let mut corner = Corner { position, texcoord: 0 };
+    let mut corner = Corner { position, texcoord: 0, normal: 0 };
     if let [b'/', after @ ..] = rest {
         rest = after;
         if !matches!(rest, [] | [b'/' | ..=b' ', ..]) {
@@ -111,7 +112,7 @@ pub(super) fn corner_at(bytes: &[u8]) -> Option<(Corner, &[u8])> {
         if let [b'/', after @ ..] = rest {
             rest = after;
             if !matches!(rest, [] | [..=b' ', ..]) {
-                rest = index(rest)?.1;
+                (corner.normal, rest) = index(rest)?;
             }
         }
     }
@@ -214,8 +215,9 @@ mod tests {
         for text in ["", "-", ".", "x", "1234567890123456789", "9007199254740993"] {
             assert_eq!(plain_decimal_at(text.as_bytes()), None, "{text}");
         }
-        let corner = Corner { position: 1, texcoord: 2 };
-        assert_eq!(corner_at(b"1/2/3\r\n"), Some((corner, &b"\r\n"[..])));
+        let corner = Corner { position: 1, texcoord: 2, normal: 0 };
+        let with_normal = Corner { normal: 3, ..corner };
+        assert_eq!(corner_at(b"1/2/3\r\n"), Some((with_normal, &b"\r\n"[..])));
         assert_eq!(corner_at(b"1/2/ 3"), Some((corner, &b" 3"[..])));
         assert_eq!(corner_at(b"1/2#"), None);
         assert_eq!(corner_at(b"1\\"), None);

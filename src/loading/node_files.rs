@@ -12,7 +12,8 @@ use rustc_hash::FxHashMap;
 use crate::engine::NodeOcclusion;
 use crate::format::cells::{CELLS_DIR, Cells, Face};
 use crate::format::{
-    NODES_DIR, NodeMesh, Scene, SharedTexture, TEXTURES_DIR, file_crc, open_regular, read_glb,
+    NODES_DIR, NodeMesh, Scene, SharedTexture, TEXTURES_DIR, file_crc, open_regular,
+    read_glb_without_normals,
 };
 use crate::render::content::{Content, DrawPicture, Picture, TextureFormat};
 use crate::{Error, Result};
@@ -148,8 +149,9 @@ impl NodeFiles {
         self.decode_shared(&textures, &files[1..], rest, |texture, picture| {
             pictures.push((texture, picture.stored_as(self.format)));
         })?;
-        let occlusion =
-            || -> Result<_> { Ok(NodeOcclusion::new(&read_glb(glb, path)?, self.scene.up)) };
+        let occlusion = || -> Result<_> {
+            Ok(NodeOcclusion::new(&read_glb_without_normals(glb, path)?, self.scene.up))
+        };
         let occlusion = self.with_occlusion.then(occlusion).transpose()?;
         Ok(Arrival { node, content, pictures, occlusion })
     }
@@ -190,7 +192,10 @@ impl NodeFiles {
             let (glb, rest) = self.checked(number, path, &bytes)?;
             self.decode_shared(&textures, &files[1..], rest, |_, _| {})?;
             match with_occlusion && self.face(number).is_none() {
-                true => Ok(Some(NodeOcclusion::new(&read_glb(glb, path)?, self.scene.up))),
+                true => Ok(Some(NodeOcclusion::new(
+                    &read_glb_without_normals(glb, path)?,
+                    self.scene.up,
+                ))),
                 false => Ok(None),
             }
         })
@@ -265,7 +270,7 @@ impl NodeFiles {
         reading.read(bytes)?;
         let path = reading.path().to_owned();
         guarded(path.clone(), || {
-            Ok(make(read_glb(self.checked(node, &path, &reading.bytes)?.0, &path)?))
+            Ok(make(read_glb_without_normals(self.checked(node, &path, &reading.bytes)?.0, &path)?))
         })
     }
 

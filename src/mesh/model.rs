@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{Material, TextureSource};
+use super::{Material, Normal, TextureSource};
 
 /// Which input axis points at the sky.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -44,7 +44,7 @@ pub struct Group {
 
 /// The triangles of one group that share one material.
 ///
-/// A vertex is a position with its texture coordinate and colour; a position that is used with
+/// A vertex is a position with its texture coordinate, colour and normal; a position that is used with
 /// two texture coordinates is two vertices. All indices are valid and all coordinates are finite.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Part {
@@ -59,6 +59,9 @@ pub struct Part {
     pub texcoords: Vec<[f32; 2]>,
     /// One per vertex, or empty. RGBA, linear light, 65535 is 1.
     pub colors: Vec<[u16; 4]>,
+    /// One per vertex, or empty; those of its triangles where it is [`Normal::NONE`]. Parts with a texture
+    /// have none: they are not lit.
+    pub normals: Vec<Normal>,
     /// Three per triangle, into this part's vertices, counter-clockwise seen from the front.
     pub indices: Vec<u32>,
 }

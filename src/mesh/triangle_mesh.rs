@@ -1,5 +1,6 @@
 //! The working mesh of a block, of a chunk of one between cutting planes, or of a node.
 
+use super::Normal;
 use super::coordinate::{Coordinate, wide};
 
 /// An indexed triangle mesh: f32 metres from its block's f64 origin, or, while a file is divided
@@ -16,6 +17,9 @@ pub struct Mesh<C = f32> {
     pub texcoords: Vec<[f32; 2]>,
     /// One per vertex, or empty where the block has no vertex colours. RGBA, linear, 65535 is 1.
     pub colors: Vec<[u16; 4]>,
+    /// One per vertex, or empty where the block has no normals but those of its triangles. A vertex with
+    /// [`Normal::NONE`] has those of its triangles.
+    pub normals: Vec<Normal>,
     /// One per vertex: index into the materials of the block's model.
     pub materials: Vec<u32>,
     /// Vertices of each triangle; all three have the same material.
@@ -44,6 +48,7 @@ impl<C: Coordinate> Mesh<C> {
             other.positions[vertex],
             other.texcoords.get(vertex).copied(),
             other.colors.get(vertex).copied(),
+            other.normals.get(vertex).copied(),
             other.materials[vertex],
         )
     }
@@ -54,6 +59,7 @@ impl<C: Coordinate> Mesh<C> {
             self.positions[vertex],
             self.texcoords.get(vertex).copied(),
             self.colors.get(vertex).copied(),
+            self.normals.get(vertex).copied(),
             self.materials[vertex],
         )
     }
@@ -64,12 +70,14 @@ impl<C: Coordinate> Mesh<C> {
         position: [C; 3],
         texcoord: Option<[f32; 2]>,
         color: Option<[u16; 4]>,
+        normal: Option<Normal>,
         material: u32,
     ) -> u32 {
         let index = self.positions.len() as u32;
         self.positions.push(position);
         self.texcoords.extend(texcoord);
         self.colors.extend(color);
+        self.normals.extend(normal);
         self.materials.push(material);
         index
     }
@@ -89,9 +97,16 @@ impl<C: Coordinate> Mesh<C> {
             positions: pick(&self.positions, vertices),
             texcoords: pick(&self.texcoords, vertices),
             colors: pick(&self.colors, vertices),
+            normals: pick(&self.normals, vertices),
             materials: pick(&self.materials, vertices),
             triangles,
         }
+    }
+
+    /// The normal of a triangle's plane.
+    pub fn triangle_normal(&self, triangle: [u32; 3]) -> Normal {
+        let [a, b, c] = self.corners(triangle);
+        Normal::along((b - a).cross(c - a))
     }
 
     /// Bounding box of the vertices, metres from the block's origin; `None` without vertices.

@@ -29,13 +29,21 @@ pub struct TextureOptions {
     pub max_atlas: u32,
     /// Whether coarse nodes give up texture seams.
     pub seams: Seams,
+    /// Whether triangles without a texture have normals.
+    pub normals: bool,
     /// Triangles of the block's root; seams are in the way where it has few for each chart.
     pub root_triangles: usize,
 }
 
 impl Default for TextureOptions {
     fn default() -> Self {
-        Self { jpeg_quality: 85, max_atlas: 4096, seams: Seams::Keep, root_triangles: 900 }
+        Self {
+            jpeg_quality: 85,
+            max_atlas: 4096,
+            seams: Seams::Keep,
+            normals: true,
+            root_triangles: 900,
+        }
     }
 }
 

@@ -19,6 +19,7 @@ mod cache;
 mod charts;
 pub(crate) mod encode;
 #[cfg(feature = "render")]
+mod face_normals;
 mod face_picture;
 mod fill;
 mod islands;

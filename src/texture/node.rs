@@ -102,7 +102,7 @@ impl ImagePlacement {
 }
 
 /// The placement of triangles without texture.
-const NO_PLACEMENT: u32 = u32::MAX;
+pub(super) const NO_PLACEMENT: u32 = u32::MAX;
 
 /// The texture of charts that have an image of their own.
 const NO_TEXTURE: u32 = u32::MAX;
@@ -119,7 +119,7 @@ impl BlockTextures<'_> {
         level: usize,
         origin: [f64; 3],
     ) -> Result<TexturedNode> {
-        self.textured(NodeBuilder::new(self, mesh, self.nearest_level(level)), skirts, origin)
+        self.textured(NodeBuilder::new(self, mesh, skirts, level), origin)
     }
 
     /// The same of a baked mesh.
@@ -130,9 +130,9 @@ impl BlockTextures<'_> {
         level: usize,
         origin: [f64; 3],
     ) -> Result<TexturedNode> {
-        let mut node = NodeBuilder::new(self, &baked.mesh, self.nearest_level(level));
+        let mut node = NodeBuilder::new(self, &baked.mesh, skirts, level);
         node.baked = Some(baked);
-        self.textured(node, skirts, origin)
+        self.textured(node, origin)
     }
 
     /// Embeds the smallest of the shared textures of a node of a level, whose file has this many
@@ -157,14 +157,8 @@ impl BlockTextures<'_> {
         if level == 0 && self.steps[level] > 1.0 { ROOT_CELL } else { CELL }
     }
 
-    fn textured(
-        &self,
-        mut node: NodeBuilder,
-        skirts: &AppendedSkirts,
-        origin: [f64; 3],
-    ) -> Result<TexturedNode> {
-        node.skirt_triangles = skirts.triangles;
-        let alike = &skirts.alike[..];
+    fn textured(&self, mut node: NodeBuilder, origin: [f64; 3]) -> Result<TexturedNode> {
+        let alike = &node.skirts.alike[..];
         node.find_charts(alike);
         for channels in [3, 4] {
             node.build_atlas(channels)?;
@@ -189,8 +183,8 @@ pub(super) struct NodeBuilder<'a> {
     /// Where it is, the triangles of its charts take their texels from it.
     baked: Option<&'a BakedMesh>,
     pub(super) level: usize,
-    /// The last so many triangles of the mesh are skirts.
-    pub(super) skirt_triangles: usize,
+    /// The last triangles of the mesh.
+    pub(super) skirts: &'a AppendedSkirts,
     pub(super) charts: Charts,
     /// By chart.
     pub(super) chart_textures: Vec<u32>,
@@ -206,13 +200,18 @@ pub(super) struct NodeBuilder<'a> {
 }
 
 impl<'a> NodeBuilder<'a> {
-    fn new(block: &'a BlockTextures<'a>, mesh: &'a Mesh, level: usize) -> Self {
+    fn new(
+        block: &'a BlockTextures<'a>,
+        mesh: &'a Mesh,
+        skirts: &'a AppendedSkirts,
+        level: usize,
+    ) -> Self {
         Self {
             block,
             mesh,
             baked: None,
-            level,
-            skirt_triangles: 0,
+            level: block.nearest_level(level),
+            skirts,
             charts: Charts::default(),
             chart_textures: Vec::new(),
             mappings: Vec::new(),

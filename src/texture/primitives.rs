@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
 
-use super::node::NodeBuilder;
+use super::face_normals::face_normals;
+use super::node::{NO_PLACEMENT, NodeBuilder};
 use crate::format::{Primitive, Surface};
-use crate::mesh::{AlphaMode, Wrap};
+use crate::mesh::{AlphaMode, Normal, Wrap};
 
 /// What primitives are told apart by, besides their image.
 type AppearanceKey = (u8, u32, bool);
@@ -18,6 +19,8 @@ struct Group {
     /// Vertices of the mesh and the placement of their texels.
     vertices: Vec<(u32, u32)>,
     indices: Vec<u32>,
+    /// One per corner, or empty.
+    normals: Vec<Normal>,
     skirt_triangles: usize,
     /// Materials in order of first use.
     materials: Vec<u32>,
@@ -53,7 +56,10 @@ impl NodeBuilder<'_> {
             BTreeMap::new();
         let mut last: Option<(u32, Option<usize>, usize)> = None;
         let mut slots = Slots::new(self.mesh.positions.len());
-        let first_skirt = self.mesh.triangles.len() - self.skirt_triangles;
+        let first_skirt = self.mesh.triangles.len() - self.skirts.triangles;
+        // What has a picture is unlit.
+        let is_lit = self.block.options.normals && self.placement_of.contains(&NO_PLACEMENT);
+        let face_normals = if is_lit { face_normals(self.mesh, self.skirts) } else { Vec::new() };
         for (number, (triangle, placement)) in
             self.mesh.triangles.iter().zip(&self.placement_of).enumerate()
         {
@@ -68,6 +74,7 @@ impl NodeBuilder<'_> {
                             image,
                             vertices: Vec::new(),
                             indices: Vec::new(),
+                            normals: Vec::new(),
                             skirt_triangles: 0,
                             materials: Vec::new(),
                         });
@@ -88,6 +95,13 @@ impl NodeBuilder<'_> {
                     group.vertices.len() as u32 - 1
                 });
                 group.indices.push(slot);
+            }
+            if image.is_none() && is_lit {
+                let face = face_normals[number];
+                group.normals.extend(triangle.map(|vertex| {
+                    let own = self.mesh.normals.get(vertex as usize);
+                    own.copied().filter(|own| *own != Normal::NONE).unwrap_or(face)
+                }));
             }
         }
         groups.into_iter().map(|group| self.primitive(group)).collect()
@@ -160,6 +174,7 @@ impl NodeBuilder<'_> {
                 alpha: source.map_or(AlphaMode::Opaque, |material| material.alpha),
                 double_sided: source.is_none_or(|material| material.double_sided),
             },
+            normals: group.normals,
             indices: group.indices,
             skirt_triangles: group.skirt_triangles,
         }

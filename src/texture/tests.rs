@@ -242,8 +242,8 @@ fn scene(
                 material,
                 positions: vec![[0.0; 3]; mesh.positions.len()],
                 texcoords: mesh.texcoords.clone(),
-                colors: Vec::new(),
                 indices: own.concat(),
+                ..Part::default()
             }
         })
         .collect();
@@ -301,8 +301,13 @@ fn decode(mesh: &NodeMesh, image: usize) -> Page {
     Page { size, pixels: decoded.into_raw() }
 }
 
-const FINEST: TextureOptions =
-    TextureOptions { jpeg_quality: 100, max_atlas: 4096, seams: Seams::Keep, root_triangles: 900 };
+const FINEST: TextureOptions = TextureOptions {
+    jpeg_quality: 100,
+    max_atlas: 4096,
+    seams: Seams::Keep,
+    normals: true,
+    root_triangles: 900,
+};
 
 /// An image that JPEG keeps well.
 fn smooth(width: u32, height: u32) -> DecodedTexture {

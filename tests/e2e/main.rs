@@ -18,6 +18,7 @@ mod houses;
 mod incremental;
 mod left_out;
 mod memory;
+mod normals;
 mod output;
 mod paths;
 mod quantize;

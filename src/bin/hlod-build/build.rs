@@ -33,8 +33,8 @@ pub struct BuildArgs {
     blocks: BlockMode,
     /// Nodes above the blocks, so that a view of a whole city costs the same however many blocks it
     /// has: `on`, or `off`, where the roots of all blocks are drawn at least
-    #[arg(long, value_enum, default_value_t = DistrictsArg::On, help_heading = "Hierarchy")]
-    districts: DistrictsArg,
+    #[arg(long, value_enum, default_value_t = SwitchArg::On, help_heading = "Hierarchy")]
+    districts: SwitchArg,
     /// The shape of the trees
     #[arg(long, value_enum, default_value_t = TreeArg::Balanced, help_heading = "Hierarchy")]
     tree: TreeArg,
@@ -112,6 +112,10 @@ pub struct BuildArgs {
     /// Compress vertices and indices without loss: `meshopt` is EXT_meshopt_compression
     #[arg(long, value_enum, default_value_t = CompressArg::None, help_heading = "Files")]
     compress: CompressArg,
+    /// Normals of triangles without a texture: those of the source where it has any, else one for each
+    /// face. Viewers that need them to light such triangles draw one flat colour without
+    #[arg(long, value_enum, default_value_t = SwitchArg::On, help_heading = "Files")]
+    normals: SwitchArg,
 
     /// Build the Kth of N shares of the inputs, into OUT/subsets/K-of-N: N machines that see the same
     /// files build one each, and `hlod-build merge OUT` joins them. Inputs, as they are written here, and
@@ -139,7 +143,7 @@ pub struct BuildArgs {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-enum DistrictsArg {
+enum SwitchArg {
     On,
     Off,
 }
@@ -226,7 +230,7 @@ impl BuildArgs {
                 ..Default::default()
             },
             blocks: self.blocks,
-            districts: self.districts == DistrictsArg::On,
+            districts: self.districts == SwitchArg::On,
             up: self.up.map(|up| match up {
                 UpArg::Y => UpAxis::Y,
                 UpArg::Z => UpAxis::Z,
@@ -237,6 +241,7 @@ impl BuildArgs {
             max_atlas: self.max_atlas,
             quantize: self.quantize,
             compress: self.compress == CompressArg::Meshopt,
+            normals: self.normals == SwitchArg::On,
             max_memory: self.max_memory.map(|Bytes(bytes)| bytes),
             resume: self.resume,
             force: self.force,

@@ -17,20 +17,21 @@ use crate::builder::stitch::Stitch;
 use crate::lattice::Lattice;
 use crate::lattice::Quantization;
 use crate::mesh::{
-    Material, Mesh, Part, PositionKey, all_differ, color_key, key, texcoord_key, wide,
+    Material, Mesh, Normal, Part, PositionKey, all_differ, color_key, key, texcoord_key, wide,
 };
 
 /// What makes two source vertices one.
-type VertexKey = (PositionKey<f64>, u64, u64, u32);
+type VertexKey = (PositionKey<f64>, u64, u64, u32, Normal);
 
-/// Joins parts into one chunk; vertices that are equal in position, texture coordinate, colour
-/// and material become one. Of `between`, those whose edge and apex are there become its stitches.
+/// Joins parts into one chunk; vertices that are equal in position, texture coordinate, colour,
+/// material and normal become one. Of `between`, those whose edge and apex are there become its stitches.
 pub fn gather(materials: &[Material], parts: &[Part], between: &[Stitch]) -> Chunk<f64> {
     let textured = |part: &Part| {
         materials[part.material as usize].texture.is_some() && !part.texcoords.is_empty()
     };
     let any_textured = parts.iter().any(textured);
     let any_colored = parts.iter().any(|part| !part.colors.is_empty());
+    let any_normals = parts.iter().any(|part| !part.normals.is_empty());
     let mut mesh = Mesh::<f64>::default();
     let total: usize = parts.iter().map(|part| part.indices.len() / 3).sum();
     mesh.triangles.reserve_exact(total);
@@ -44,7 +45,9 @@ pub fn gather(materials: &[Material], parts: &[Part], between: &[Stitch]) -> Chu
             let position = part.positions[vertex].map(|coordinate| coordinate + 0.0);
             let texcoord = if has_texcoords { part.texcoords[vertex] } else { [0.0; 2] };
             let color = part.colors.get(vertex).copied().unwrap_or([u16::MAX; 4]);
-            let same = (key(position), texcoord_key(texcoord), color_key(color), part.material);
+            let normal = part.normals.get(vertex).copied().unwrap_or(Normal::NONE);
+            let same =
+                (key(position), texcoord_key(texcoord), color_key(color), part.material, normal);
             *welded.entry(same).or_insert_with(|| {
                 mesh.positions.push(position);
                 if any_textured {
@@ -52,6 +55,9 @@ pub fn gather(materials: &[Material], parts: &[Part], between: &[Stitch]) -> Chu
                 }
                 if any_colored {
                     mesh.colors.push(color);
+                }
+                if any_normals {
+                    mesh.normals.push(normal);
                 }
                 mesh.materials.push(part.material);
                 mesh.positions.len() as u32 - 1
@@ -78,7 +84,8 @@ fn stitched(mesh: &mut Mesh<f64>, between: &[Stitch]) -> Vec<[u32; 3]> {
         let like = like as usize;
         let texcoord = mesh.texcoords.get(like).copied().map_or(0, texcoord_key);
         let color = mesh.colors.get(like).copied().map_or(0, color_key);
-        (key(position), texcoord, color, mesh.materials[like])
+        // A vertex with any normal will do: stitches are in no leaf.
+        (key(position), texcoord, color, mesh.materials[like], Normal::NONE)
     };
     let mut vertices: FxHashMap<VertexKey, u32> = FxHashMap::default();
     let mut found: FxHashSet<PositionKey<f64>> = FxHashSet::default();
@@ -268,6 +275,7 @@ pub fn localise(
         positions: mesh.positions.iter().map(|&position| local(position)).collect(),
         texcoords: mesh.texcoords,
         colors: mesh.colors,
+        normals: mesh.normals,
         materials: mesh.materials,
         triangles: mesh.triangles,
     };

@@ -81,6 +81,7 @@ fn subset(part: &Part, keep: impl Fn(&[[f64; 3]; 3]) -> bool) -> Part {
                 result.positions.push(part.positions[old]);
                 result.texcoords.extend(part.texcoords.get(old));
                 result.colors.extend(part.colors.get(old));
+                result.normals.extend(part.normals.get(old));
             }
             result.indices.push(new_index[old]);
         }

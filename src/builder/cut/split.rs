@@ -23,7 +23,7 @@ use crate::builder::border::vertex::{Border, Path};
 use crate::builder::cut::uncut::UncutComponents;
 use crate::builder::simplify::compact::renumber;
 use crate::lattice::Lattice;
-use crate::mesh::{Coordinate, Mesh, PositionKey, all_differ, key, wide};
+use crate::mesh::{Coordinate, Mesh, Normal, PositionKey, all_differ, key, wide};
 
 /// Limits of the labelling.
 #[derive(Clone, Copy, Debug)]
@@ -368,6 +368,11 @@ fn push_crossing<C: Coordinate>(
         mesh.colors.push(std::array::from_fn(|i| {
             (f64::from(start[i]) + (f64::from(end[i]) - f64::from(start[i])) * t).round() as u16
         }));
+    }
+    if !mesh.normals.is_empty() {
+        let ends = mesh.normals[low].vector().zip(mesh.normals[high].vector());
+        let between = ends.map(|(start, end)| Normal::along(start.lerp(end, t)));
+        mesh.normals.push(between.unwrap_or(Normal::NONE));
     }
     mesh.materials.push(mesh.materials[low]);
     index

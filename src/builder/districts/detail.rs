@@ -9,7 +9,7 @@ use crate::builder::constants::MeasureConstants;
 use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::error::{Detail, Original, SurfaceError};
 use crate::builder::hierarchy::Tree;
-use crate::format::{NODES_DIR, NodeMesh, read_glb};
+use crate::format::{NODES_DIR, NodeMesh, read_glb_without_normals};
 use crate::mesh::{Mesh, all_differ, key};
 use crate::{Error, Result};
 
@@ -36,7 +36,7 @@ impl<'a> FileDetail<'a> {
         let path = files.out.join(NODES_DIR).join(&tree.record.file);
         let bytes = std::fs::read(&path)
             .map_err(|error| Error::output(&path, format!("cannot be read again: {error}")))?;
-        let mesh = surface(&read_glb(&bytes, &path)?, files.origin);
+        let mesh = surface(&read_glb_without_normals(&bytes, &path)?, files.origin);
         Ok(Self { files, tree, surface: Arc::new(Original::of(&mesh, files.constants)) })
     }
 }

@@ -15,6 +15,10 @@ use crate::lattice::Lattice;
 use crate::mesh::{Group, Material, Model, Part, TextureData, TextureSource, Warnings, all_differ};
 use crate::{Error, Result};
 
+/// Normals within this angle of their triangle's are the triangle's own, rounded: the cosine of 2°.
+/// Normals of 8 bits are off by 0.6°, and positions are rounded once more.
+const SAME_PLANE: f64 = 0.9994;
+
 /// What stood in the files of some nodes.
 pub struct Members {
     /// Their surfaces. Textures are those of the nodes, without their pictures.
@@ -114,24 +118,28 @@ impl Reader<'_> {
             let source = primitive.indices.len() - 3 * primitive.skirt_triangles;
             let (surface, skirts) = primitive.indices.split_at(source);
             self.skirts.extend(polygons(skirts.as_chunks::<3>().0, &positions));
-            let indices: Vec<u32> = surface
-                .as_chunks::<3>()
-                .0
-                .iter()
-                .filter(|corners| all_differ(corners.map(|corner| positions[corner as usize])))
-                .flatten()
-                .copied()
-                .collect();
+            let (mut indices, mut normals) = (Vec::new(), Vec::new());
+            for (number, corners) in surface.as_chunks::<3>().0.iter().enumerate() {
+                if all_differ(corners.map(|corner| positions[corner as usize])) {
+                    indices.extend(corners);
+                    normals
+                        .extend(primitive.normals.get(3 * number..3 * number + 3).unwrap_or(&[]));
+                }
+            }
             if !indices.is_empty() {
-                let (texcoords, colors) = (primitive.texcoords, primitive.colors);
-                self.model.parts.push(Part {
+                let mut part = Part {
                     group: 0,
                     material,
                     positions,
-                    texcoords,
-                    colors,
+                    texcoords: primitive.texcoords,
+                    colors: primitive.colors,
+                    normals: Vec::new(),
                     indices,
-                });
+                };
+                if !normals.is_empty() {
+                    part.set_normals(normals, SAME_PLANE);
+                }
+                self.model.parts.push(part);
             }
         }
         Ok(())

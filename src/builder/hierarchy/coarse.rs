@@ -1,5 +1,6 @@
 //! Making a coarse node: simplification, border, distance from the original.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::BlockBuilder;
@@ -17,6 +18,7 @@ use crate::builder::simplify::compact::compact;
 use crate::builder::simplify::face_colors::with_face_colors;
 use crate::builder::simplify::fallback::fallback_triangles;
 use crate::builder::simplify::ladder::{AppearanceWeights, Method, simplify};
+use crate::builder::simplify::normal_sets::weld_normals;
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::builder::simplify::weld_seams::weld_seams;
 use crate::builder::stages::Stage;
@@ -219,7 +221,15 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let constants = &self.options.constants;
         let rules = SkirtRules::of(&self.lattice, self.quantization.is_some(), constants.border);
         let at = resolution as u8;
-        let mut mesh = source.clone();
+        let welded = weld_normals(source, &border);
+        let (source, normal_sets) = match welded {
+            Some((mesh, of_mesh, sets)) => {
+                border = of_mesh;
+                (Cow::Owned(mesh), Some(sets))
+            }
+            None => (Cow::Borrowed(source), None),
+        };
+        let mut mesh = Mesh::clone(&source);
         thin_border(&mut mesh, &mut border, path, at);
         // Skirts count towards the budget, but may not take more than half of it.
         let spans = join_spans(spans, path, at, &mesh, &border);
@@ -240,9 +250,12 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             result = self.snapped(result);
         }
         if result.mesh.triangles.is_empty() {
-            result = fallback_triangles(source, &border, FALLBACK_TRIANGLES.min(target));
+            result = fallback_triangles(&source, &border, FALLBACK_TRIANGLES.min(target));
         }
         cap_sections(&mut result, &spans, path, &mesh, &border);
+        if let Some(sets) = normal_sets {
+            sets.resolve(&mut result.mesh, &mut result.border);
+        }
         let mut skirts = skirts(&result.mesh, &result.border, &spans, path, &rules);
         if self.quantization.is_some() {
             for (position, _) in skirts.iter_mut().flat_map(|skirt| &mut skirt.corners) {

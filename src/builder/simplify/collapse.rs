@@ -82,6 +82,7 @@ pub(super) fn collapse(
         positions,
         texcoords: mesh.texcoords.clone(),
         colors: mesh.colors.clone(),
+        normals: mesh.normals.clone(),
         materials: mesh.materials.clone(),
         triangles,
     };

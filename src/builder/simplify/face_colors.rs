@@ -151,7 +151,7 @@ mod tests {
             materials: vec![0; positions.len()],
             triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 4]],
             positions,
-            texcoords: Vec::new(),
+            ..Mesh::default()
         }
     }
 

@@ -4,10 +4,10 @@ use rustc_hash::FxHashMap;
 
 use crate::builder::border::slit::close_slits;
 use crate::builder::border::vertex::Border;
-use crate::mesh::{Mesh, PositionKey, color_key, key, texcoord_key};
+use crate::mesh::{Mesh, Normal, PositionKey, color_key, key, texcoord_key};
 
-/// What makes two vertices one: position, texture coordinate, colour and material.
-type VertexKey = (PositionKey<f32>, u64, u64, u32);
+/// What makes two vertices one: position, texture coordinate, colour, material and normal.
+type VertexKey = (PositionKey<f32>, u64, u64, u32, Normal);
 
 /// Joins meshes that bound each other at planes beyond the first `parent_planes`.
 pub fn merge(children: &[(&Mesh, &Border)], parent_planes: usize) -> (Mesh, Border) {
@@ -51,5 +51,6 @@ fn vertex_key(mesh: &Mesh, vertex: usize) -> VertexKey {
         mesh.texcoords.get(vertex).map_or(0, |&texcoord| texcoord_key(texcoord)),
         mesh.colors.get(vertex).map_or(0, |&color| color_key(color)),
         mesh.materials[vertex],
+        mesh.normals.get(vertex).copied().unwrap_or(Normal::NONE),
     )
 }

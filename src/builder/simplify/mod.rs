@@ -10,6 +10,7 @@ pub mod fallback;
 mod far_parts;
 pub mod ladder;
 pub mod merge;
+pub mod normal_sets;
 pub mod orient;
 mod parts;
 pub mod simplified;

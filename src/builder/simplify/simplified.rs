@@ -25,6 +25,7 @@ impl Simplified {
         self.mesh.positions.extend(other.positions);
         self.mesh.texcoords.extend(other.texcoords);
         self.mesh.colors.extend(other.colors);
+        self.mesh.normals.extend(other.normals);
         self.mesh.materials.extend(other.materials);
         self.border.planes.extend(border.planes);
         self.border.keep.extend(border.keep);

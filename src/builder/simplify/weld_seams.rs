@@ -67,6 +67,7 @@ mod tests {
             colors: vec![[1, 2, 3, 4]; 6],
             materials: vec![0, 0, 1, 1, 2, 2],
             triangles: vec![[0, 1, 3], [2, 1, 3], [0, 2, 3], [4, 5, 3]],
+            ..Mesh::default()
         };
         let border = Border { planes: vec![1, 0, 2, 0, 4, 0], keep: vec![3, 0, 2, 0, 1, 0] };
         let (joined, border) = weld_seams(&mesh, &border, &classes);

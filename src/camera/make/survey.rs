@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::plan::Plan;
 use super::raster::Surfaces;
-use crate::format::{NODES_DIR, Node, Scene, read_glb};
+use crate::format::{NODES_DIR, Node, Scene, read_glb_without_normals};
 use crate::{Error, Result};
 
 /// Triangles to read at most, unless the coarsest nodes have more.
@@ -55,7 +55,7 @@ pub(super) fn read(
         let path = dir.join(NODES_DIR).join(&scene.nodes[index as usize].file);
         let bytes = std::fs::read(&path)
             .map_err(|error| Error::input(&path, format!("cannot read the node: {error}")))?;
-        let mesh = read_glb(&bytes, &path)?;
+        let mesh = read_glb_without_normals(&bytes, &path)?;
         let origin = DVec3::from_array(mesh.origin);
         for primitive in &mesh.primitives {
             let places: Vec<DVec3> = primitive

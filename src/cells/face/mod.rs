@@ -165,6 +165,7 @@ impl Made {
                 texcoords: layer.texcoords,
                 colors: Vec::new(),
                 indices: layer.triangles.into_flattened(),
+                normals: Vec::new(),
                 skirt_triangles: 0,
                 surface: Surface {
                     base_color: [1.0; 4],

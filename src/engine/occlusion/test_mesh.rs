@@ -22,6 +22,7 @@ pub(super) fn mesh(triangles: &[[[f32; 3]; 3]]) -> NodeMesh {
             positions,
             texcoords: Vec::new(),
             colors: Vec::new(),
+            normals: Vec::new(),
             skirt_triangles: 0,
             surface: Surface {
                 base_color: [1.0; 4],

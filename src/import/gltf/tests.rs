@@ -784,3 +784,68 @@ fn time_scales_with_the_primitives_that_share_an_accessor() {
         },
     );
 }
+
+/// The square with a normal that is tilted, under these transforms; and the first corner's normals.
+fn tilted(normals: [[f32; 3]; 4], nodes: &[Value]) -> Result<(Vec<Option<DVec3>>, Model), String> {
+    let (mut json, mut binary) = square();
+    binary.extend(normals.as_flattened().iter().flat_map(|value| value.to_le_bytes()));
+    json["buffers"][0]["byteLength"] = binary.len().into();
+    let views = json["bufferViews"].as_array_mut().unwrap();
+    views.push(json!({"buffer": 0, "byteOffset": 92, "byteLength": 48}));
+    let accessors = json["accessors"].as_array_mut().unwrap();
+    accessors.push(json!({"bufferView": 3, "componentType": 5126, "count": 4, "type": "VEC3"}));
+    json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = 3.into();
+    json["nodes"] = nodes
+        .iter()
+        .map(|node| {
+            let mut node = node.clone();
+            node["mesh"] = 0.into();
+            node
+        })
+        .collect();
+    json["scenes"][0]["nodes"] = (0..nodes.len()).collect();
+    let model = read_glb(&json, &binary)?;
+    let first = |part: &Part| part.normals.get(part.indices[0] as usize)?.vector();
+    Ok((model.parts.iter().map(first).collect(), model))
+}
+
+#[test]
+fn normals_turn_with_their_node() {
+    let nodes = [
+        json!({}),
+        json!({"scale": [-1, 1, 1]}),
+        json!({"scale": [2, 1, 1]}),
+        json!({"rotation": [0, 0, 0.7071067811865476, 0.7071067811865476]}),
+        json!({"scale": [3, 3, -3]}),
+    ];
+    let (found, model) = tilted([[0.6, 0.0, 0.8]; 4], &nodes).unwrap();
+    let expected =
+        [[0.6, 0., 0.8], [-0.6, 0., 0.8], [0.3, 0., 0.8], [0., 0.6, 0.8], [0.6, 0., -0.8]];
+    for (found, expected) in found.iter().zip(expected) {
+        let off = found.unwrap().distance(DVec3::from(expected).normalize());
+        assert!(off < 1e-4, "{found:?} for {expected:?}");
+    }
+    // All look to the side that their triangles face.
+    for part in &model.parts {
+        for corners in part.indices.as_chunks::<3>().0 {
+            let [a, b, c] = corners.map(|vertex| DVec3::from(part.positions[vertex as usize]));
+            let normal = part.normals[corners[0] as usize].vector().unwrap();
+            assert!((b - a).cross(c - a).dot(normal) > 0.0);
+        }
+    }
+    assert!(model.warnings.is_empty(), "{:?}", model.warnings);
+}
+
+#[test]
+fn normals_that_cannot_be_are_dropped_and_counted() {
+    let bad = [[0.0, 0.0, 0.0], [f32::NAN, 0.0, 1.0], [0.0, 0.6, -0.8], [0.6, 0.0, 0.8]];
+    let (_, model) = tilted(bad, &[json!({})]).unwrap();
+    let part = &model.parts[0];
+    let kept = |vertex: &&u32| part.normals[**vertex as usize] != Normal::NONE;
+    assert_eq!(part.indices.iter().filter(kept).count(), 1);
+    let counts: Vec<u64> = model.warnings.iter().map(|(_, count)| count).collect();
+    assert_eq!(counts, [4], "two vertices, and two corners of the third");
+    // A square that is flat in its normals, too, keeps none.
+    let (flat, model) = tilted([[0.0, 0.0, 2.0]; 4], &[json!({"scale": [2, 3, 4]})]).unwrap();
+    assert_eq!((flat, model.warnings.is_empty()), (vec![None], true));
+}

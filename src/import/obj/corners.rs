@@ -17,6 +17,8 @@ pub(super) struct Run {
     pub(super) part: u32,
     /// Its material has, or may yet turn out to have, a texture.
     pub(super) textured: bool,
+    /// Its material has no texture, as far as is known.
+    pub(super) lit: bool,
 }
 
 /// A chunk's triangles.
@@ -26,30 +28,35 @@ pub(super) struct Triangles {
     pub(super) vertices: Vec<Pair>,
     /// Indices into `vertices`, three for each triangle.
     pub(super) indices: Vec<u32>,
+    /// By index, the normal's number, or [`NONE`]; empty where no lit face has one.
+    pub(super) normals: Vec<u32>,
     /// Part of each run, where its indices end, and its faces without texture coordinates.
     pub(super) runs: Vec<(u32, usize, u64)>,
     pub(super) stats: CleanStats,
 }
 
 impl Triangles {
-    /// Triangulates the faces of a chunk. `before` is how many positions and texture coordinates
-    /// come before it; `positions` are all up to its end, and every index is in range.
+    /// Triangulates the faces of a chunk. `before` is how many positions, texture coordinates and
+    /// normals come before it; `positions` are all up to its end, and every index is in range.
     pub(super) fn of(
         statements: &Statements,
         runs: &[Run],
-        before: [usize; 2],
+        before: [usize; 3],
         positions: &Paged<[f64; 3]>,
     ) -> Self {
         let mut result =
             Self { indices: Vec::with_capacity(statements.corners.len()), ..Self::default() };
-        let corners: Vec<[u32; 2]> = statements
+        let corners: Vec<[u32; 3]> = statements
             .corners
             .iter()
-            .map(|[position, texcoord]| {
+            .map(|[position, texcoord, normal]| {
                 let position = position.resolve(before[0]).unwrap_or(0);
-                [position, texcoord.resolve(before[1]).unwrap_or(NONE)]
+                let texcoord = texcoord.resolve(before[1]).unwrap_or(NONE);
+                [position, texcoord, normal.resolve(before[2]).unwrap_or(NONE)]
             })
             .collect();
+        let has_normals =
+            runs.iter().any(|run| run.lit) && corners.iter().any(|[_, _, normal]| *normal != NONE);
         let places = Places::of(&corners);
         let mut unifier = Unifier::default();
         unifier.grow(places.count());
@@ -62,10 +69,10 @@ impl Triangles {
                 let face = &corners[first..first + count as usize];
                 first += count as usize;
                 if run.textured {
-                    bare_faces += u64::from(face.iter().any(|[_, texcoord]| *texcoord == NONE));
+                    bare_faces += u64::from(face.iter().any(|[_, texcoord, _]| *texcoord == NONE));
                 }
                 let mut add = |corner: usize| {
-                    let [position, texcoord] = face[corner];
+                    let [position, texcoord, normal] = face[corner];
                     let texcoord = if run.textured { texcoord } else { NONE };
                     let pair = Pair { part: run.part, position: places.number(position), texcoord };
                     let index = unifier.vertex(pair);
@@ -73,6 +80,9 @@ impl Triangles {
                         result.vertices.push(Pair { position, ..pair });
                     }
                     result.indices.push(index);
+                    if has_normals {
+                        result.normals.push(if run.lit { normal } else { NONE });
+                    }
                 };
                 if face.len() == 3 {
                     (0..3).for_each(add);
@@ -80,7 +90,7 @@ impl Triangles {
                 }
                 outline.clear();
                 outline.extend(
-                    face.iter().filter_map(|&[position, _]| positions.get(position as usize)),
+                    face.iter().filter_map(|&[position, ..]| positions.get(position as usize)),
                 );
                 if !outline.as_flattened().iter().all(|coordinate| coordinate.is_finite()) {
                     result.stats.not_finite += face.len() as u64 - 2;
@@ -108,8 +118,8 @@ enum Places {
 const MOST_PER_CORNER: usize = 4;
 
 impl Places {
-    fn of(corners: &[[u32; 2]]) -> Self {
-        let all = || corners.iter().map(|[position, _]| *position);
+    fn of(corners: &[[u32; 3]]) -> Self {
+        let all = || corners.iter().map(|[position, ..]| *position);
         let (Some(low), Some(high)) = (all().min(), all().max()) else {
             return Self::Dense { low: 0, count: 0 };
         };

@@ -5,16 +5,17 @@ use std::path::Path;
 use crate::mesh::Warnings;
 
 /// Faces with an index that is 0 or out of range, by the kind of the index: position, texture
-/// coordinate. A face counts once for each kind.
+/// coordinate, normal. A face counts once for each kind.
 #[derive(Debug, Default)]
 pub(in crate::import) struct IndexFaults {
-    kinds: [Faults; 2],
+    kinds: [Faults; 3],
 }
 
 /// What messages say of each kind: its name, what became of the face, and the elements' name.
-const KINDS: [[&str; 3]; 2] = [
+const KINDS: [[&str; 3]; 3] = [
     ["vertex index", "face dropped", "vertices"],
     ["texture coordinate index", "the face's texture coordinates dropped", "texture coordinates"],
+    ["normal index", "the face's normals dropped", "normals"],
 ];
 
 #[derive(Debug, Default)]

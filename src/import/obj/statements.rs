@@ -6,12 +6,15 @@
 
 use std::borrow::Cow;
 
+use glam::DVec3;
+
 use super::super::clean::CleanStats;
 use super::super::lines::{Lines, text};
 use super::super::plain_text::BYTE_ORDER_MARK;
 use super::super::tokens::{Corner, NO_ELEMENT, corner, corner_at, number, plain_decimal_at, word};
 use super::colors::Colors;
 use super::index_faults::IndexFaults;
+use crate::mesh::Normal;
 
 /// Most corners of a face: beyond this the ear clipping's own indices could overflow.
 const MOST_CORNERS: usize = 1 << 20;
@@ -81,16 +84,18 @@ pub(in crate::import) struct Statements {
     pub(in crate::import) positions: Vec<[f64; 3]>,
     pub(in crate::import) colors: Colors,
     pub(in crate::import) texcoords: Vec<[f64; 2]>,
-    /// Position and texture coordinate of all faces' corners.
-    pub(in crate::import) corners: Vec<[Reference; 2]>,
+    /// [`Normal::NONE`] where the file's has no direction.
+    pub(in crate::import) normals: Vec<Normal>,
+    /// Position, texture coordinate and normal of all faces' corners.
+    pub(in crate::import) corners: Vec<[Reference; 3]>,
     /// How many corners each face has, at least 3.
     pub(in crate::import) faces: Vec<u32>,
     /// With the number of faces before each.
     pub(in crate::import) changes: Vec<(usize, Change)>,
-    /// How many positions and texture coordinates there must be before the chunk.
-    needed: [i64; 2],
+    /// How many positions, texture coordinates and normals there must be before the chunk.
+    needed: [i64; 3],
     /// How many there are, once that is known; then indices out of range are left out.
-    before: Option<[usize; 2]>,
+    before: Option<[usize; 3]>,
     pub(in crate::import) index_faults: IndexFaults,
     pub(in crate::import) stats: CleanStats,
     pub(in crate::import) lines: u64,
@@ -104,15 +109,15 @@ impl Statements {
     }
 
     /// Parses the chunk, of this text, once more where an index is out of range, now that it is
-    /// known how many positions and texture coordinates come before it. A face whose position is
-    /// out of range is left out; one whose texture coordinate is loses all of them.
-    pub(in crate::import) fn settle(&mut self, text: &[u8], before: [usize; 2]) {
-        if (0..2).any(|kind| self.needed[kind] > before[kind] as i64) {
+    /// known how many positions, texture coordinates and normals come before it. A face whose position
+    /// is out of range is left out; one whose texture coordinate or normal is loses all of them.
+    pub(in crate::import) fn settle(&mut self, text: &[u8], before: [usize; 3]) {
+        if (0..3).any(|kind| self.needed[kind] > before[kind] as i64) {
             *self = Self::parse(text, Some(before));
         }
     }
 
-    fn parse(chunk: &[u8], before: Option<[usize; 2]>) -> Self {
+    fn parse(chunk: &[u8], before: Option<[usize; 3]>) -> Self {
         let mut result = Self { before, ..Self::default() };
         let mut lines = Lines::new(chunk);
         loop {
@@ -132,11 +137,11 @@ impl Statements {
         result
     }
 
-    /// Refuses a chunk that cannot be read, where so many positions and texture coordinates and so
-    /// many lines come before it.
+    /// Refuses a chunk that cannot be read, where so many positions, texture coordinates and normals
+    /// and so many lines come before it.
     pub(in crate::import) fn check(
         &mut self,
-        before: [usize; 2],
+        before: [usize; 3],
         lines: u64,
     ) -> Result<(), String> {
         if let Some((line, what)) = self.problem.take() {
@@ -144,6 +149,7 @@ impl Statements {
         }
         if before[0] + self.positions.len() > MOST_VERTICES
             || before[1] + self.texcoords.len() > MOST_VERTICES
+            || before[2] + self.normals.len() > MOST_VERTICES
         {
             return Err(format!("more than {MOST_VERTICES} vertices; divide the file"));
         }
@@ -189,7 +195,13 @@ impl Statements {
                 self.faces.push(count as u32);
                 end
             }
-            [b'v', b'n', ..] | [b'#', ..] => {
+            [b'v', b'n', b' ', rest @ ..] => {
+                let (vector, rest) = plain_decimals(rest)?;
+                let rest = line_end(rest)?;
+                self.normals.push(Normal::along(DVec3::from_array(vector)));
+                Some(rest)
+            }
+            [b'#', ..] => {
                 let end = memchr::memchr(b'\n', text)?;
                 (!matches!(text[end - 1], b'\\' | b'\r')).then_some(&text[end + 1..])
             }
@@ -207,6 +219,10 @@ impl Statements {
         let change = match &lower_case(keyword)[..] {
             b"v" => return self.position(rest),
             b"vt" => return self.texcoord(rest),
+            b"vn" => {
+                self.normal(rest);
+                return Ok(());
+            }
             b"f" | b"fo" => return self.face(rest, line),
             b"o" | b"g" => Change::Group(name(rest)),
             b"usemtl" => Change::Material(name(rest)),
@@ -215,7 +231,7 @@ impl Statements {
                 self.stats.not_triangles += 1;
                 return Ok(());
             }
-            // Comments, normals, smoothing groups, display attributes.
+            // Comments, smoothing groups, display attributes.
             _ => return Ok(()),
         };
         self.changes.push((self.faces.len(), change));
@@ -268,6 +284,13 @@ impl Statements {
         Ok(())
     }
 
+    /// A normal that cannot be read is one without direction: it may be that nothing uses it.
+    fn normal(&mut self, mut rest: &[u8]) {
+        let mut read = || word(&mut rest).and_then(number).unwrap_or(f64::NAN);
+        let vector = DVec3::from_array([read(), read(), read()]);
+        self.normals.push(Normal::along(vector));
+    }
+
     fn face(&mut self, mut rest: &[u8], line: u64) -> Result<(), String> {
         let first = self.corners.len();
         while let Some(word) = word(&mut rest) {
@@ -296,9 +319,9 @@ impl Statements {
     /// `first`, what is out of range. Returns false where nothing is left of it.
     fn settle_face(&mut self, first: usize, line: u64) -> bool {
         let Some(before) = self.before else { return true };
-        let local = [self.positions.len(), self.texcoords.len()];
+        let local = [self.positions.len(), self.texcoords.len(), self.normals.len()];
         let face = &mut self.corners[first..];
-        let mut is_faulty = |kind: usize, face: &[[Reference; 2]]| {
+        let mut is_faulty = |kind: usize, face: &[[Reference; 3]]| {
             let fault =
                 face.iter().find_map(|corner| corner[kind].out_of_range(before[kind], local[kind]));
             if let Some(index) = fault {
@@ -310,31 +333,35 @@ impl Statements {
             self.corners.truncate(first);
             return false;
         }
-        if is_faulty(1, face) {
-            face.iter_mut().for_each(|[_, texcoord]| *texcoord = Reference(ABSENT));
+        for kind in [1, 2] {
+            if is_faulty(kind, face) {
+                face.iter_mut().for_each(|corner| corner[kind] = Reference(ABSENT));
+            }
         }
         true
     }
 
     #[inline]
     fn corner(&mut self, corner: Corner) {
-        let counts = [self.positions.len() as i64, self.texcoords.len() as i64];
+        let counts = [self.positions.len(), self.texcoords.len(), self.normals.len()];
         let mut reference = |index: i64, kind: usize| {
+            let count = counts[kind] as i64;
             let (needed, reference) = if index > 0 {
-                (index - counts[kind], index - 1)
+                (index - count, index - 1)
             } else {
-                let place = counts[kind] + index;
+                let place = count + index;
                 (-place, RELATIVE + place)
             };
             self.needed[kind] = self.needed[kind].max(needed);
             Reference(reference)
         };
         let position = reference(corner.position, 0);
-        let texcoord = match corner.texcoord {
+        let mut attribute = |index: i64, kind: usize| match index {
             0 => Reference(ABSENT),
-            index => reference(index, 1),
+            index => reference(index, kind),
         };
-        self.corners.push([position, texcoord]);
+        let (texcoord, normal) = (attribute(corner.texcoord, 1), attribute(corner.normal, 2));
+        self.corners.push([position, texcoord, normal]);
     }
 }
 

@@ -1,5 +1,7 @@
 use std::fs;
 
+use glam::DVec3;
+
 use super::super::lines::text;
 use super::super::tests::check;
 use super::*;
@@ -538,6 +540,7 @@ fn faces_with_a_texture_coordinate_out_of_range_lose_it_alone() {
         ("f 1/-3 2/1 3/1 4/1", Some(-3)),
         ("f 1/1/0 2/1/0 3/1/0 4/1/0", None),
         ("f 1/1/9 2/1/-7 3/1/0 4/1", None),
+        ("f 1/1 2/1 3/1 4/1", None),
     ] {
         let model = model(&format!("{face}\n"));
         assert_eq!(model.triangle_count(), 2, "{face}");
@@ -548,7 +551,8 @@ fn faces_with_a_texture_coordinate_out_of_range_lose_it_alone() {
                         coordinates dropped";
             (format!("{what} (first in line 9: {index} of 2 texture coordinates)"), 1)
         });
-        assert_eq!(warnings(&model).into_iter().next(), warned, "{face}");
+        let found = warnings(&model).into_iter().find(|(what, _)| !what.starts_with("normal"));
+        assert_eq!(found, warned, "{face}");
     }
     let both = model("f 1/1 2/1 3/1\nf 1/1 3/9 4/1\n");
     let textured = |vertex: &&u32| both.parts[0].texcoords[**vertex as usize] == [0.5, 0.75];
@@ -556,12 +560,63 @@ fn faces_with_a_texture_coordinate_out_of_range_lose_it_alone() {
 }
 
 #[test]
+fn normals_of_untextured_faces_are_kept() {
+    // The first face is smooth, the second has the normal of its plane, the third none.
+    let normals = "vn 0.6 0 0.8\nvn 0 0 3\nvn 0 -6e-1 .8 # tilted\n";
+    let faces = "f 1//1 2//3 3//-2\nf 1//2 3//2 4//2\nf 4 3 2\n";
+    let obj = format!("{SQUARE}{normals}{faces}");
+    check_chunks(&folder_with(&[]), obj.as_bytes());
+    let model = read(&obj, &[]).unwrap();
+    let part = &model.parts[0];
+    let of_corner = |corner: usize| part.normals[part.indices[corner] as usize];
+    let along = |x: f64, y: f64, z: f64| Normal::along(DVec3::new(x, y, z));
+    let smooth = [along(3.0, 0.0, 4.0), along(0.0, -3.0, 4.0), along(0.0, 0.0, 1.0)];
+    assert_eq!([0, 1, 2].map(of_corner), smooth);
+    assert!((3..9).all(|corner| of_corner(corner) == Normal::NONE));
+    // Each of the first face's corners is on a vertex of its own.
+    assert_eq!((part.positions.len(), part.normals.len()), (7, 7));
+    assert!(model.warnings.is_empty(), "{:?}", model.warnings);
+}
+
+#[test]
+fn normals_without_a_use_are_dropped() {
+    let flat = read(&format!("{SQUARE}vn 0 0 1\nf 1//1 2//1 3//1 4//1\n"), &[]).unwrap();
+    assert!(flat.parts[0].normals.is_empty());
+    let files = [("a.mtl", "newmtl t\nmap_Kd t.png\nnewmtl u\n"), ("t.png", "")];
+    let textured = format!("{SQUARE}vn 1 0 1\nusemtl t\nf 1//1 2//1 3//1\n");
+    // A library may say later that a material has a texture.
+    for obj in [format!("mtllib a.mtl\n{textured}"), format!("{textured}mtllib a.mtl\n")] {
+        assert!(read(&obj, &files).unwrap().parts[0].normals.is_empty());
+    }
+    let late = format!("{SQUARE}vn 1 0 1\nusemtl u\nf 1//1 2//1 3//1\nmtllib a.mtl\n");
+    assert_eq!(read(&late, &files).unwrap().parts[0].normals.len(), 3);
+}
+
+#[test]
+fn normals_that_cannot_be_are_dropped_and_counted() {
+    let normals = "vn 0 0 0\nvn nan 0 1\nvn 0 0 -1\nvn 1 x\nvn\nvn 0.6 0 0.8\n";
+    let faces = "f 1//1 2//2 3//6\nf 1//3 3//4 4//5\nf 1//7 4//6 2//0\n";
+    let obj = format!("{SQUARE}{normals}{faces}");
+    check_chunks(&folder_with(&[]), obj.as_bytes());
+    let model = read(&obj, &[]).unwrap();
+    let part = &model.parts[0];
+    let is_there = |corner: &usize| part.normals[part.indices[*corner] as usize] != Normal::NONE;
+    assert_eq!((0..9).filter(is_there).collect::<Vec<_>>(), [2]);
+    let found = warnings(&model);
+    let dropped = "normal without a direction or to the back of its face, replaced by the face's";
+    assert!(found.contains(&(dropped.into(), 5)), "{found:?}");
+    assert!(found.iter().any(|(what, count)| what.contains("7 of 6 normals") && *count == 1));
+}
+
+#[test]
 fn texture_coordinates_that_the_file_does_not_have_are_dropped_from_all_faces() {
     let obj = format!("{SQUARE}f 1/1/1 2/2/2 3/3/3 4/4/4\nf -1/-1 -2/-2 -3/-3\n");
     let model = read(&obj, &[]).unwrap();
     assert_eq!(model.triangle_count(), 3);
+    let normals = "normal index that is 0 or out of range, the face's normals dropped (first in line \
+                   5: 1 of 0 normals)";
     assert_eq!(warnings(&model)[0].1, 2, "{:?}", model.warnings);
-    assert_eq!(model.warnings.iter().count(), 1, "one warning for a file");
+    assert_eq!(warnings(&model)[1..], [(normals.into(), 1)], "one warning for a file and kind");
     check_chunks(&folder_with(&[]), obj.as_bytes());
 }
 

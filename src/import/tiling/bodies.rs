@@ -26,7 +26,7 @@ impl Bodies {
 
     /// Joins what the faces of a settled chunk have in common; so many vertices come before it.
     pub fn join_faces(&mut self, chunk: &Statements, before: usize) {
-        let mut corners = chunk.corners.iter().map(|[position, _]| position.resolve(before));
+        let mut corners = chunk.corners.iter().map(|[position, ..]| position.resolve(before));
         for &count in &chunk.faces {
             let mut first = None;
             for corner in corners.by_ref().take(count as usize) {

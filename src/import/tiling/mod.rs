@@ -22,7 +22,7 @@ use std::sync::Arc;
 use self::bodies::Bodies;
 use self::division::{Counts, Division};
 use self::spilled::Spilled;
-use self::tile_text::{Belongs, FaceCorner, Names, TileReader, TileText};
+use self::tile_text::{Belongs, FaceCorner, NONE, Names, TileReader, TileText};
 use super::clean::CleanStats;
 use super::find::{Kind, kind};
 use super::names::NameSample;
@@ -33,7 +33,7 @@ use super::obj::statements::{Change, MOST_VERTICES, Statements};
 use super::obj::{Batch, CHUNK_BYTES, FileTraits, Parsed, load_part};
 use super::plain_text::PlainText;
 use crate::bytes::Bytes;
-use crate::mesh::{Model, Triangulator, UpAxis, UpEvidence, UpGuess, Warnings};
+use crate::mesh::{Model, Normal, Triangulator, UpAxis, UpEvidence, UpGuess, Warnings};
 use crate::stage_timer::StageTimer;
 use crate::{Error, Result};
 
@@ -236,6 +236,7 @@ struct Tiler<'a> {
     placed: usize,
     bodies: Bodies,
     texcoords: Spilled<[f64; 2]>,
+    normals: Spilled<Normal>,
     /// One per position where a vertex has a colour; linear light.
     colors: Spilled<[u16; 4]>,
     color_range: ColorRange,
@@ -265,6 +266,7 @@ impl<'a> Tiler<'a> {
             placed: 0,
             bodies: Bodies::default(),
             texcoords: Spilled::new(dir)?,
+            normals: Spilled::new(dir)?,
             colors: Spilled::new(dir)?,
             color_range: ColorRange::default(),
             sample: NameSample::default(),
@@ -281,9 +283,9 @@ impl<'a> Tiler<'a> {
 
     /// Joins what the faces of the next chunk have in common, and keeps its vertices.
     fn join(&mut self, Parsed { text, statements: mut chunk }: Parsed) -> Result<(), Fault> {
-        // Texture coordinates do not matter here.
+        // Texture coordinates and normals do not matter here.
         let before = self.positions.len();
-        chunk.settle(&text, [before, MOST_VERTICES]);
+        chunk.settle(&text, [before, MOST_VERTICES, MOST_VERTICES]);
         self.traits.has_colors |= !chunk.colors.values.is_empty();
         self.color_range = self.color_range.joined(chunk.colors.range);
         chunk.changes.iter().for_each(|(_, change)| self.sample.add(change.name()));
@@ -295,7 +297,7 @@ impl<'a> Tiler<'a> {
             let mut outline = Vec::new();
             for &count in &chunk.faces {
                 outline.clear();
-                for [position, _] in &chunk.corners[first..first + count as usize] {
+                for [position, ..] in &chunk.corners[first..first + count as usize] {
                     let position = position.resolve(before).map_or(usize::MAX, |at| at as usize);
                     outline.extend(self.positions.get(position)?);
                 }
@@ -331,7 +333,7 @@ impl<'a> Tiler<'a> {
 
     /// Adds the next chunk.
     fn add(&mut self, Parsed { text, statements: mut chunk }: Parsed) -> Result<(), Fault> {
-        let before = [self.placed, self.texcoords.len()];
+        let before = [self.placed, self.texcoords.len(), self.normals.len()];
         chunk.settle(&text, before);
         chunk.check(before, self.lines).map_err(Fault::Text)?;
         self.index_faults.add(&chunk.index_faults, self.lines);
@@ -346,6 +348,7 @@ impl<'a> Tiler<'a> {
         }
         self.placed += chunk.positions.len();
         self.texcoords.extend(std::mem::take(&mut chunk.texcoords))?;
+        self.normals.extend(std::mem::take(&mut chunk.normals))?;
         let (mut first, mut corner) = (0, 0);
         for (end, change) in std::mem::take(&mut chunk.changes) {
             self.faces(&chunk, first..end, &mut corner, before)?;
@@ -370,7 +373,7 @@ impl<'a> Tiler<'a> {
         chunk: &Statements,
         faces: std::ops::Range<usize>,
         first: &mut usize,
-        before: [usize; 2],
+        before: [usize; 3],
     ) -> Result<(), Fault> {
         let mut corners: Vec<FaceCorner> = Vec::new();
         let mut outline: Vec<[f64; 3]> = Vec::new();
@@ -378,9 +381,10 @@ impl<'a> Tiler<'a> {
             let references = &chunk.corners[*first..*first + count as usize];
             *first += count as usize;
             corners.clear();
-            for [position, texcoord] in references {
+            for [position, texcoord, normal] in references {
                 let position = position.resolve(before[0]).unwrap_or(0);
                 let texcoord = texcoord.resolve(before[1]);
+                let normal = normal.resolve(before[2]);
                 corners.push(FaceCorner {
                     at: self.positions.get(position as usize)?.unwrap_or_default(),
                     texcoord: match texcoord {
@@ -388,7 +392,11 @@ impl<'a> Tiler<'a> {
                         None => None,
                     },
                     color: self.colors.get(position as usize)?,
-                    source: Some([position, texcoord.unwrap_or(u32::MAX)]),
+                    normal: match normal {
+                        Some(normal) => self.normals.get(normal as usize)?,
+                        None => None,
+                    },
+                    source: Some([position, texcoord.unwrap_or(NONE), normal.unwrap_or(NONE)]),
                 });
             }
             outline.clear();
@@ -397,7 +405,7 @@ impl<'a> Tiler<'a> {
                 self.stats.not_finite += u64::from(count) - 2;
                 continue;
             }
-            let first = corners.first().and_then(|corner| corner.source).map_or(0, |[at, _]| at);
+            let first = corners.first().and_then(|corner| corner.source).map_or(0, |[at, ..]| at);
             let body = self.bodies.tile_of(first);
             if let Some(tile) = body.or_else(|| self.division.tile_of(&outline)) {
                 self.tiles[tile].add(&corners, self.belongs);

@@ -3,6 +3,8 @@ use std::fmt::Write;
 use std::fs;
 use std::io::Write as _;
 
+use glam::DVec3;
+
 use super::*;
 use crate::random::Random;
 
@@ -297,4 +299,48 @@ fn tiles_share_what_is_known_of_the_whole_file() {
     }
     let in_whole = whole.parts.into_iter().flat_map(|part| part.colors);
     assert!(in_whole.into_iter().all(|color| colors.contains(&color)));
+}
+
+/// Normals of a tile are those of the file; where a face was cut, between those of its corners.
+#[test]
+fn normals_are_kept_in_tiles() {
+    let side = 40;
+    let vector = |[x, y, _]: [f64; 3]| DVec3::new(0.02 * x, 0.01 * y, 1.0);
+    let mut text = String::new();
+    for number in 0..(side + 1) * (side + 1) {
+        let at = [number % (side + 1), number / (side + 1)].map(f64::from);
+        let DVec3 { x, y, z } = vector([at[0], at[1], 0.0]);
+        writeln!(text, "v {} {} 0\nvn {x} {y} {z}", at[0], at[1]).unwrap();
+    }
+    for number in (0..side * (side + 1)).filter(|number| number % (side + 1) < side) {
+        let [a, b, c, d] = [1, 2, side + 3, side + 2].map(|step| number + step);
+        writeln!(text, "f {a}//{a} {b}//{b} {c}//{c} {d}//{d}").unwrap();
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sheet.obj");
+    fs::write(&path, text).unwrap();
+    let known: BTreeMap<[u64; 3], Normal> = super::super::load(&path)
+        .unwrap()
+        .parts
+        .iter()
+        .flat_map(|part| part.positions.iter().zip(&part.normals))
+        .map(|(position, normal)| (position.map(f64::to_bits), *normal))
+        .collect();
+    let tiling = tiled(&path, 300).unwrap();
+    let mut cut = 0;
+    for tile in 0..tiling.tiles() {
+        for part in tiling.load(tile).unwrap().parts {
+            assert_eq!(part.normals.len(), part.positions.len());
+            for (position, normal) in part.positions.iter().zip(&part.normals) {
+                if let Some(known) = known.get(&position.map(f64::to_bits)) {
+                    assert_eq!(normal, known);
+                    continue;
+                }
+                cut += 1;
+                let off = normal.vector().unwrap().angle_between(vector(*position));
+                assert!(off < 1e-3, "{position:?}: {off}");
+            }
+        }
+    }
+    assert!(tiling.tiles() > 4 && cut > 40, "{} tiles, {cut} new vertices", tiling.tiles());
 }

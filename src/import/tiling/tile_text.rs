@@ -10,6 +10,7 @@ use rustc_hash::FxHashMap;
 use super::super::bounds::joined;
 use super::division::Corner;
 use crate::color::linear_to_srgb;
+use crate::mesh::Normal;
 
 /// What a file says of a corner.
 #[derive(Clone, Copy, Debug)]
@@ -18,8 +19,9 @@ pub(super) struct FaceCorner {
     pub texcoord: Option<[f64; 2]>,
     /// Linear light.
     pub color: Option<[u16; 4]>,
-    /// Numbers of its position and texture coordinate, where the file has them.
-    pub source: Option<[u32; 2]>,
+    pub normal: Option<Normal>,
+    /// Numbers of its position, texture coordinate and normal, where the file has them.
+    pub source: Option<[u32; 3]>,
 }
 
 impl Corner for FaceCorner {
@@ -31,12 +33,15 @@ impl Corner for FaceCorner {
         let mix = |a: f64, b: f64| a + (b - a) * part;
         let texcoords = self.texcoord.zip(other.texcoord);
         let colors = self.color.zip(other.color);
+        let vector = |corner: &Self| corner.normal.and_then(Normal::vector);
+        let normals = vector(self).zip(vector(other));
         Self {
             at,
             texcoord: texcoords.map(|(a, b)| [0, 1].map(|i| mix(a[i], b[i]))),
             color: colors.map(|(a, b)| {
                 std::array::from_fn(|i| mix(f64::from(a[i]), f64::from(b[i])).round() as u16)
             }),
+            normal: normals.map(|(a, b)| Normal::along(a.lerp(b, part))),
             source: None,
         }
     }
@@ -66,18 +71,19 @@ pub(super) struct TileText {
     /// Least and greatest coordinates.
     pub bounds: Option<[[f64; 3]; 2]>,
     /// What is not in the file yet.
-    corners: Vec<[u32; 2]>,
+    corners: Vec<[u32; 3]>,
     faces: Vec<(u32, Belongs)>,
     positions: Vec<([f64; 3], Option<[u16; 4]>)>,
     texcoords: Vec<[f64; 2]>,
-    known: [FxHashMap<u32, u32>; 2],
+    normals: Vec<Normal>,
+    known: [FxHashMap<u32, u32>; 3],
     /// What the text says so far.
     libraries: usize,
     belongs: Belongs,
 }
 
-/// No texture coordinate.
-const NONE: u32 = u32::MAX;
+/// No texture coordinate or normal.
+pub(super) const NONE: u32 = u32::MAX;
 
 impl TileText {
     /// Corners of faces that are not in the file yet.
@@ -87,7 +93,7 @@ impl TileText {
 
     pub fn add(&mut self, corners: &[FaceCorner], belongs: Belongs) {
         for corner in corners {
-            let number = |kind: usize, known: &mut [FxHashMap<u32, u32>; 2], next: usize| {
+            let number = |kind: usize, known: &mut [FxHashMap<u32, u32>; 3], next: usize| {
                 let new = next as u32;
                 corner.source.map_or(new, |of| *known[kind].entry(of[kind]).or_insert(new))
             };
@@ -104,7 +110,14 @@ impl TileText {
                 }
                 number
             });
-            self.corners.push([position, texcoord]);
+            let normal = corner.normal.map_or(NONE, |normal| {
+                let number = number(2, &mut self.known, self.normals.len());
+                if number as usize == self.normals.len() {
+                    self.normals.push(normal);
+                }
+                number
+            });
+            self.corners.push([position, texcoord, normal]);
         }
         self.faces.push((corners.len() as u32, belongs));
     }
@@ -123,6 +136,7 @@ impl TileText {
         self.faces.clear();
         self.positions.clear();
         self.texcoords.clear();
+        self.normals.clear();
         self.known.iter_mut().for_each(FxHashMap::clear);
         Ok(())
     }
@@ -147,8 +161,14 @@ impl TileText {
         for [u, v] in &self.texcoords {
             writeln!(text, "vt {u} {v}")?;
         }
+        for normal in &self.normals {
+            // Zero where the file's has no direction. 32 bits say more than is kept.
+            let [x, y, z] = normal.vector().unwrap_or_default().as_vec3().to_array();
+            writeln!(text, "vn {x} {y} {z}")?;
+        }
         let mut corners = self.corners.iter();
-        let counts = [self.positions.len(), self.texcoords.len()].map(|count| count as i64);
+        let counts = [self.positions.len(), self.texcoords.len(), self.normals.len()]
+            .map(|count| count as i64);
         for &(count, belongs) in &self.faces {
             if belongs.group != self.belongs.group {
                 text.extend([b"o ", &names.groups[belongs.group - 1][..], b"\n"].concat());
@@ -159,11 +179,15 @@ impl TileText {
             }
             self.belongs = belongs;
             text.push(b'f');
-            for &[position, texcoord] in corners.by_ref().take(count as usize) {
+            for &[position, texcoord, normal] in corners.by_ref().take(count as usize) {
                 // Counted back from the end.
                 write!(text, " {}", i64::from(position) - counts[0])?;
                 if texcoord != NONE {
                     write!(text, "/{}", i64::from(texcoord) - counts[1])?;
+                }
+                if normal != NONE {
+                    let slashes = if texcoord == NONE { "//" } else { "/" };
+                    write!(text, "{slashes}{}", i64::from(normal) - counts[2])?;
                 }
             }
             text.push(b'\n');

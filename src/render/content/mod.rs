@@ -25,7 +25,7 @@ pub(crate) use texture_format::LONGEST_COMPRESSED;
 pub use texture_format::TextureFormat;
 pub use vertex::Vertex;
 
-use crate::format::{NodeImageData, NodeMesh, read_glb};
+use crate::format::{NodeImageData, NodeMesh, read_glb_without_normals};
 use crate::{Error, Result};
 
 /// The corners of triangles as indices into the vertices: 16 bits where they suffice.
@@ -56,7 +56,7 @@ impl Content {
     /// Decodes a node's file, whose bytes are `glb`; `file` is for messages only. `shared` finds
     /// the index of a shared picture by its file name in `textures/`.
     pub fn decode(file: &Path, glb: &[u8], shared: impl Fn(&str) -> Option<u32>) -> Result<Self> {
-        Self::from_mesh(file, &read_glb(glb, file)?, shared)
+        Self::from_mesh(file, &read_glb_without_normals(glb, file)?, shared)
     }
 
     /// What is held of a node of which `mesh` was read; `file` is for messages only.

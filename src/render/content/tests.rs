@@ -24,6 +24,7 @@ fn square(x: f32, surface: Surface) -> Primitive {
         texcoords: if surface.image.is_some() { corners.to_vec() } else { Vec::new() },
         colors: Vec::new(),
         indices: vec![0, 1, 2, 0, 2, 3],
+        normals: Vec::new(),
         skirt_triangles: 0,
         surface,
     }

@@ -154,8 +154,8 @@ fn torn(mesh: &Mesh, color: impl Fn(DVec3, DVec3) -> [u8; 3]) -> (Model, Mesh) {
         material: 0,
         positions: torn.positions.iter().map(|p| p.map(f64::from)).collect(),
         texcoords: torn.texcoords.clone(),
-        colors: Vec::new(),
         indices: torn.triangles.concat(),
+        ..Part::default()
     };
     let model = Model {
         source: PathBuf::from("torn.obj"),

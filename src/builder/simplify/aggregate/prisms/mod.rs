@@ -26,7 +26,7 @@ use self::outlines::Outlines;
 use self::regions::{Labels, Regions};
 use super::look::Look;
 use crate::builder::constants::PrismConstants;
-use crate::mesh::{Mesh, UpAxis, wide};
+use crate::mesh::{Mesh, Normal, UpAxis, wide};
 
 /// Prisms with at most about `target` triangles for the bodies.
 pub(super) fn prisms(
@@ -182,6 +182,9 @@ impl Walls<'_> {
         }
         if !self.mesh.colors.is_empty() {
             result.colors.push(look.color.map(|channel| channel.round() as u16));
+        }
+        if !self.mesh.normals.is_empty() {
+            result.normals.push(Normal::NONE);
         }
         result.positions.len() as u32 - 1
     }
