@@ -7,7 +7,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use hlod::mesh::UpAxis;
+use hlod::mesh::{UpAxis, UpEvidence};
 use hlod::random::Random;
 
 #[path = "../tests/common/tiles.rs"]
@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let metres = rest.first().map_or(Ok(0.0), |text| text.parse::<f64>())? / 1000.0;
     let model = hlod::import::load(Path::new(model))?;
-    let axes = match hlod::builder::up::guess(&model) {
+    let axes = match UpEvidence::of(&model).guess().axis {
         UpAxis::Y => [0, 2],
         UpAxis::Z => [0, 1],
     };
