@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::directed::{Directed, Largest, seed};
 use super::original::Original;
-use super::{RELATIVE_ROUNDING, SurfaceError, rounding, statistics};
+use super::{NEAR_ROUNDING, RELATIVE_ROUNDING, SurfaceError, exact, rounding, statistics};
 use crate::Result;
 use crate::builder::constants::MeasureConstants;
 use crate::mesh::Mesh;
@@ -169,6 +169,11 @@ impl Way {
         seed(from, to, &mut largest);
         let (largest, _) = Directed::new(from, to, largest, rounding).run();
         let bound = f64::from(largest.bound()) * (1.0 + RELATIVE_ROUNDING) + f64::from(rounding);
+        let is_near = largest.found <= NEAR_ROUNDING * rounding;
+        if let Some(exact) = is_near.then(|| exact::one_way(from, to)).flatten() {
+            let bound = bound.min(exact.bound + f64::from(to.most_off()));
+            return Self { found: exact.found, bound, near: None };
+        }
         let is_found = largest.found > start;
         let found = f64::from(largest.found) * (1.0 - RELATIVE_ROUNDING) - f64::from(rounding);
         Self {

@@ -22,15 +22,12 @@ use glam::{DVec3, Vec3};
 use super::bvh::{Box3, LEAF};
 use super::original::{Original, Search, TriangleId};
 use super::overlay::{Mark, Marks, Overlay};
-use super::polygon::{Clipped, Polygon, bisect, centroid, clip};
+use super::polygon::{Clipped, MOST_CORNERS, Polygon, bisect, centroid, clip};
 use super::triangle::{LANES, Points, Triangle, max};
 use crate::builder::constants::MeasureConstants;
 
 /// The bound is at most so many times the largest distance found, as far as the budget goes.
 pub const TIGHTNESS: f32 = 1.1;
-
-/// A polygon with more corners is bisected: clipping may add some.
-const MOST_CORNERS: usize = 24;
 
 /// The largest distance of both ways, as far as it is known.
 #[derive(Clone, Copy, Debug)]
@@ -363,7 +360,8 @@ impl<'a> Directed<'a> {
         if corners.len() <= MOST_CORNERS && !much_larger {
             // What is clipped exactly to the limit would seem to be beyond it half of the time.
             let near = f64::from(limit - self.rounding - off);
-            let clipped = (near > 0.0).then(|| clip(&corners, centre, reach, &triangle, near));
+            let clipped =
+                (near > 0.0).then(|| clip(&corners, centre, reach, &triangle.frame(), near));
             if let Some(Clipped { inside, outside }) = clipped.flatten() {
                 let (farthest, _) = farthest_corner(&triangle, &inside);
                 if self.largest.settles(farthest + off) {

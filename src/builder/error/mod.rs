@@ -3,6 +3,7 @@
 //! - [`Original`]: a surface that is searched, of one mesh or of several
 //! - `bvh`, `triangle`: its hierarchy, and eight triangles at a time
 //! - `directed`, `polygon`: the bound on the largest distance, one way
+//! - `exact`: the same in f64, for surfaces that f32 cannot tell apart
 //! - `overlay`, `adjacency`: proving that a triangle is near by walking over the other surface
 //! - `detail`: the same where the original is known by surfaces that are off it themselves
 //! - `samples`: points for the mean, and [`MeanDistance`] to choose among meshes by it
@@ -11,6 +12,7 @@ mod adjacency;
 mod bvh;
 mod detail;
 mod directed;
+mod exact;
 mod mean;
 mod nearest;
 mod original;
@@ -33,7 +35,7 @@ use crate::mesh::Mesh;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfaceError {
     /// No point of one surface is farther from the other (an upper bound of the Hausdorff
-    /// distance). 0 where they are equal to within rounding of f32 coordinates.
+    /// distance). 0 where they are equal to within a tenth of what rounding coordinates to f32 does.
     pub bound: f64,
     /// Of points of both surfaces, evenly spread by area, half of them of each: the mean distance.
     pub mean: f64,
@@ -86,16 +88,18 @@ pub fn measure(original: &Original, simplified: &Mesh) -> Measured {
     let (largest, marks) = Directed::new(simplified, original, largest, rounding).run();
     let back = Directed::new(original, simplified, largest, rounding).with_marks(marks);
     let (largest, _) = back.run();
-    let equal = largest.bound() <= 2.0 * rounding * TIGHTNESS;
-    let bound = match equal {
-        true => 0.0,
-        false => f64::from(largest.bound()) * (1.0 + RELATIVE_ROUNDING) + f64::from(rounding),
+    let bound = f64::from(largest.bound()) * (1.0 + RELATIVE_ROUNDING) + f64::from(rounding);
+    let is_near = largest.found <= NEAR_ROUNDING * rounding;
+    let exact = is_near.then(|| exact::both_ways(original, simplified)).flatten();
+    let (found, bound) = match exact {
+        Some(exact) => (exact.found, exact.bound.min(bound)),
+        None => (largest.found.into(), bound),
     };
     let (mean, rms, p95) = statistics(original, simplified, bound);
     Measured {
         error: SurfaceError { bound, mean, rms, p95 },
-        largest: if equal { 0.0 } else { largest.found.into() },
-        exhausted: largest.exhausted,
+        largest: found,
+        exhausted: largest.exhausted && exact.is_none(),
         divisions: largest.divisions,
     }
 }
@@ -110,6 +114,10 @@ fn rounding(a: &Original, b: &Original) -> f32 {
     let magnitude = a.bounds.magnitude().max(b.bounds.magnitude());
     f32::EPSILON * (magnitude + 12.0 * a.longest.max(b.longest))
 }
+
+/// Distances below so many times [`rounding`] are measured again in f64: rounding would be a large
+/// part of the bound.
+const NEAR_ROUNDING: f32 = 8.0;
 
 /// Mean, root mean square and 95th percentile of sampled distances, none above `bound`.
 fn statistics(a: &Original, b: &Original, bound: f64) -> (f64, f64, f64) {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::adjacency::{Adjacency, Links, Slot};
 use super::bvh::{Box3, Bvh, LEAF, Node, Tree};
@@ -147,6 +147,23 @@ impl Original {
         })
     }
 
+    /// Corners of a triangle as its mesh has them, in f64; `None` where these are not kept
+    /// ([`Self::of_points`]).
+    pub(super) fn exact_corners(&self, id: TriangleId) -> Option<[DVec3; 3]> {
+        let linked = self.parts[id.part as usize].adjacency.triangles.get(id.slot() as usize)?;
+        let [x, y, z] = linked.corners;
+        Some([0, 1, 2].map(|at| DVec3::new(x[at].into(), y[at].into(), z[at].into())))
+    }
+
+    /// All triangles.
+    pub(super) fn ids(&self) -> impl Iterator<Item = TriangleId> {
+        (0..).zip(&self.parts).flat_map(|(part, one)| {
+            (0..).zip(&one.bvh.counts).flat_map(move |(leaf, &count)| {
+                (0..count.into()).map(move |lane| TriangleId { part, leaf, lane })
+            })
+        })
+    }
+
     /// Several surfaces as one. Their triangles are shared, not copied.
     pub fn union(parts: Vec<Arc<Self>>) -> Self {
         let constants = parts.first().map_or_else(Default::default, |part| part.constants);
@@ -241,6 +258,38 @@ impl<'a> Search<'a> {
 
     pub fn original(&self) -> &'a Original {
         self.original
+    }
+
+    /// Visits the leaves whose boxes are within a distance, near ones first. `visit` returns how far
+    /// others may be from then on; negative to end.
+    pub fn leaves_near(
+        &mut self,
+        point: Vec3,
+        mut reach: f32,
+        mut visit: impl FnMut(u32, u32) -> f32,
+    ) {
+        let Original { parts, top, numbers, .. } = self.original;
+        self.stack.clear();
+        self.stack.push((0.0, TOP, top.root));
+        while let Some((squared, part, child)) = self.stack.pop() {
+            if squared > reach * reach {
+                continue;
+            }
+            if child & LEAF == 0 {
+                let tree = if part == TOP { top } else { &parts[part as usize].bvh.tree };
+                // More than the square, so that what is just within the reach is pushed.
+                let most = reach * reach * 1.000_001 + f32::MIN_POSITIVE;
+                push(&mut self.stack, &tree.nodes[child as usize], part, point, most);
+            } else if part == TOP {
+                let part = numbers[(child & !LEAF) as usize];
+                self.stack.push((squared, part, parts[part as usize].bvh.tree.root));
+            } else {
+                reach = visit(part, child & !LEAF);
+                if reach < 0.0 {
+                    return;
+                }
+            }
+        }
     }
 
     /// The nearest triangle, or one that is not farther than `enough`.

@@ -1,12 +1,15 @@
 //! Convex parts of triangles, and cutting them.
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3};
 
-use super::triangle::Triangle;
+use super::triangle::Frame;
 
 /// A convex polygon. Its corners are f64, so that cutting it again and again moves nothing by as
 /// much as an f32 is rounded.
 pub(super) type Polygon = Vec<DVec3>;
+
+/// A polygon with more corners is bisected: clipping may add some.
+pub(super) const MOST_CORNERS: usize = 24;
 
 /// Corners closer to a plane than this share of the polygon's size lie on it.
 const ON_PLANE: f64 = 1e-9;
@@ -87,16 +90,14 @@ pub(super) fn clip(
     polygon: &[DVec3],
     centroid: DVec3,
     radius: f64,
-    triangle: &Triangle,
+    triangle: &Frame,
     reach: f64,
 ) -> Option<Clipped> {
-    let Triangle { origin, along, up, length, apex } = *triangle;
-    let [origin, along, up] = [origin, along, up].map(Vec3::as_dvec3);
+    let Frame { origin, along, up, length, apex } = *triangle;
     let normal = along.cross(up);
     let flat = |point: DVec3| DVec2::new((point - origin).dot(along), (point - origin).dot(up));
     let height = |point: DVec3| (point - origin).dot(normal);
-    let apex = DVec2::new(apex[0].into(), apex[1].into());
-    let corners = [DVec2::ZERO, DVec2::new(length.into(), 0.0), apex];
+    let corners = [DVec2::ZERO, DVec2::new(length, 0.0), apex];
     // Of the reach each way gets what the centroid needs and half of what that leaves.
     let at = flat(centroid);
     let squared_height = height(centroid).powi(2);

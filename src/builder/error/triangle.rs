@@ -1,6 +1,6 @@
 //! The distance from points to triangles, eight at a time.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// Triangles that are tested at a time.
 pub(super) const LANES: usize = 8;
@@ -33,10 +33,20 @@ pub(super) struct Triangle {
     pub apex: [f32; 2],
 }
 
-impl Triangle {
-    /// The frame is found in f64, so that it is square to f32 however thin the triangle is.
-    pub fn new(corners: [Vec3; 3]) -> Self {
-        let [a, b, c] = from_longest_edge(corners.map(|corner| corner.as_dvec3()));
+/// The frame of a [`Triangle`] in f64, which is square to f32 however thin the triangle is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    pub origin: DVec3,
+    pub along: DVec3,
+    pub up: DVec3,
+    /// Of the longest edge.
+    pub length: f64,
+    pub apex: DVec2,
+}
+
+impl Frame {
+    pub fn new(corners: [DVec3; 3]) -> Self {
+        let [a, b, c] = from_longest_edge(corners);
         let along = (b - a).try_normalize().unwrap_or(DVec3::X);
         let aside = |way: DVec3| way - along * way.dot(along);
         // Twice, since the first leaves rounding of the length of the way, which a needle's apex
@@ -45,11 +55,60 @@ impl Triangle {
         let up = up.filter(|up| up.dot(along).abs() < 1e-9);
         let up = up.unwrap_or_else(|| along.any_orthonormal_vector());
         Self {
-            origin: a.as_vec3(),
+            origin: a,
+            along,
+            up,
+            length: (b - a).dot(along),
+            apex: DVec2::new((c - a).dot(along), (c - a).dot(up).max(0.0)),
+        }
+    }
+
+    /// The distance of a point, as [`Triangle::squared_distance`] finds it.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        let way = point - self.origin;
+        let at = DVec2::new(way.dot(self.along), way.dot(self.up));
+        let height = way.dot(self.along.cross(self.up));
+        let end = DVec2::new(self.length, 0.0);
+        let to_edge = |from: DVec2, to: DVec2| {
+            let edge = to - from;
+            let squared = edge.length_squared();
+            let share = if squared > 0.0 { (at - from).dot(edge) / squared } else { 0.0 };
+            (at - from - edge * share.clamp(0.0, 1.0)).length_squared()
+        };
+        let is_within = at.y >= 0.0
+            && at.perp_dot(self.apex) >= 0.0
+            && (at - end).perp_dot(self.apex - end) <= 0.0;
+        let edges = [(DVec2::ZERO, end), (end, self.apex), (self.apex, DVec2::ZERO)];
+        let beside = match is_within {
+            true => 0.0,
+            false => edges.map(|(a, b)| to_edge(a, b)).into_iter().fold(f64::INFINITY, f64::min),
+        };
+        (height * height + beside).sqrt()
+    }
+}
+
+impl Triangle {
+    pub fn new(corners: [Vec3; 3]) -> Self {
+        let Frame { origin, along, up, length, apex } =
+            Frame::new(corners.map(|corner| corner.as_dvec3()));
+        Self {
+            origin: origin.as_vec3(),
             along: along.as_vec3(),
             up: up.as_vec3(),
-            length: (b - a).dot(along) as f32,
-            apex: [(c - a).dot(along) as f32, (c - a).dot(up).max(0.0) as f32],
+            length: length as f32,
+            apex: apex.as_vec2().into(),
+        }
+    }
+
+    /// What its frame is in f64.
+    pub fn frame(&self) -> Frame {
+        let [origin, along, up] = [self.origin, self.along, self.up].map(Vec3::as_dvec3);
+        Frame {
+            origin,
+            along,
+            up,
+            length: self.length.into(),
+            apex: Vec2::from(self.apex).as_dvec2(),
         }
     }
 

@@ -3,6 +3,8 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::BlockBuilder;
 use super::node::{Forest, NodeDraft, NodeSink, Tree};
 use super::outline::{LeftOut, SourceOutline, more_triangles};
@@ -96,6 +98,47 @@ impl<R> Outcome<R> {
     }
 }
 
+/// Cosine of the angle between a skirt's normal and an axis, at least, and how far apart its corners
+/// are along the axis, as a share of its longest edge, at most: it then lies in a cutting plane.
+const IN_PLANE: (f64, f64) = (0.99, 0.01);
+
+/// The mesh with the skirt triangles that lie in no cutting plane: from a border vertex beside the
+/// plane to the plane. They are seen as surface, so they count in the distance from the original.
+fn with_skirts_beside<'a>(mesh: &'a Mesh, skirts: &[Skirt]) -> Cow<'a, Mesh> {
+    let mut beside: Vec<[[f32; 3]; 3]> = Vec::new();
+    for Skirt { edge, corners, triangles } in skirts {
+        let position = |corner: u8| match usize::from(corner) {
+            end @ (0 | 1) => mesh.positions[edge[end] as usize],
+            corner => corners[corner - 2].0,
+        };
+        let all = triangles.iter().map(|triangle| triangle.map(position));
+        beside.extend(all.filter(|&corners| !lies_in_plane(corners)));
+    }
+    if beside.is_empty() {
+        return Cow::Borrowed(mesh);
+    }
+    let (mut positions, mut triangles) = (mesh.positions.clone(), mesh.triangles.clone());
+    for corners in beside {
+        let first = positions.len() as u32;
+        positions.extend(corners);
+        triangles.push([first, first + 1, first + 2]);
+    }
+    let materials = vec![0; positions.len()];
+    Cow::Owned(Mesh { positions, triangles, materials, ..Mesh::default() })
+}
+
+fn lies_in_plane(corners: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(|corner| DVec3::from(corner.map(f64::from)));
+    let normal = (b - a).cross(c - a);
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let spread = a.max(b).max(c) - a.min(b).min(c);
+    let (cosine, share) = IN_PLANE;
+    let along = |axis: usize| {
+        normal[axis].abs() >= cosine * normal.length() && spread[axis] <= share * longest
+    };
+    (0..3).any(along)
+}
+
 impl<S: NodeSink> BlockBuilder<'_, S> {
     /// Simplifies and writes a node that is not a leaf, or leaves it out.
     pub(super) fn coarse_node(
@@ -126,7 +169,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             // Nobody draws it: what is above need not be farther off than what is below.
             (Outcome::LeftOut(LeftOut { child_path, triangles, kept }), below)
         } else {
-            let error = measure(&original, &mesh)?.at_least(&below);
+            let error = measure(&original, &with_skirts_beside(&mesh, &skirts))?.at_least(&below);
             let on_border = |&&planes: &&u64| planes & node.path.bits() != 0;
             // Of what is written alone: parents take their colours from the original, too.
             let painted =
@@ -274,5 +317,28 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         mesh.triangles.retain(|t| all_differ(t.map(|vertex| positions[vertex as usize])));
         let (mesh, border) = compact(&mesh, &border);
         Simplified { mesh, border, error, step }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn skirts_beside_their_plane_are_measured_and_those_in_it_are_not() {
+        let mesh = Mesh {
+            positions: vec![[4.0, 0.0, 0.0], [4.0, 9.0, 0.0], [0.0, 0.0, 0.0]],
+            materials: vec![0; 3],
+            triangles: vec![[0, 1, 2]],
+            ..Mesh::default()
+        };
+        let skirt = |x: f32| Skirt {
+            edge: [0, 1],
+            corners: vec![([x, 9.0, -0.5], 0)],
+            triangles: vec![[0, 1, 2]],
+        };
+        assert!(matches!(with_skirts_beside(&mesh, &[skirt(4.0)]), Cow::Borrowed(_)));
+        let with = with_skirts_beside(&mesh, &[skirt(4.0), skirt(3.0)]);
+        assert_eq!((with.triangles.len(), with.positions.len()), (2, 6));
     }
 }
