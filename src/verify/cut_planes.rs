@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::geometry::NodeGeometry;
 use super::sample::cross;
 use super::seams::Seam;
-use super::tree::{apart, input_of, is_leaf, leaves};
+use super::tree::{apart, input_of, is_leaf, leaves, line};
 use crate::format::{Node, Scene};
 use crate::mesh::NEAR;
 
@@ -28,8 +28,9 @@ const FACING: f64 = 0.98;
 type Plane = (usize, u64);
 
 /// Marks the triangles of coarse nodes that lie in a plane at which they were cut.
-/// Each list of seams finds planes by itself. Between inputs, leaves that touch in a plane are enough: what
-/// was scanned twice need not have an edge in common.
+/// Each list of seams finds planes by itself. Leaves whose boxes touch in a plane are enough, too: a
+/// source that ends on both sides of a cut has no edge in common there, yet both sides have skirts. A
+/// plane that separates two nodes bounds all nodes below them.
 pub(super) fn mark(
     scene: &Scene,
     geometry: &mut [NodeGeometry],
@@ -39,8 +40,8 @@ pub(super) fn mark(
     let mut planes: Vec<BTreeSet<Plane>> = vec![BTreeSet::new(); geometry.len()];
     let mut part = |[a, b]: [u32; 2], axis: usize, coordinates: [u64; 2]| {
         for (line, coordinate) in apart(scene, a, b).into_iter().zip(coordinates) {
-            for node in line {
-                planes[node as usize].insert((axis, coordinate));
+            if let Some(&topmost) = line.last() {
+                planes[topmost as usize].insert((axis, coordinate));
             }
         }
     };
@@ -57,25 +58,28 @@ pub(super) fn mark(
         }
     }
     for axis in 0..3 {
-        for ([a, b], coordinates) in touching_inputs(scene, axis) {
+        for ([a, b], coordinates) in touching_leaves(scene, axis) {
             part([a, b], axis, coordinates.map(f64::to_bits));
         }
     }
     geometry.par_iter_mut().enumerate().for_each(|(number, node)| {
-        if is_leaf(scene, number as u32) || planes[number].is_empty() {
+        if is_leaf(scene, number as u32) {
             return;
         }
+        let planes: Vec<&Plane> =
+            line(scene, number as u32).flat_map(|node| &planes[node as usize]).collect();
         let in_cut_plane = |(&skirt, &triangle): (&bool, &[u32; 3])| {
             let corners = node.corners(triangle);
-            skirt && planes[number].iter().any(|plane| lies_in(corners, plane, steps[number]))
+            skirt && planes.iter().any(|plane| lies_in(corners, plane, steps[number]))
         };
         node.in_cut_plane = node.skirts.iter().zip(&node.triangles).map(in_cut_plane).collect();
     });
 }
 
-/// Leaves of two inputs of which the one's box ends where the other's begins along an axis, and where: pairs,
-/// the one that ends first. Leaves that are flat along the axis are not cut across it.
-fn touching_inputs(scene: &Scene, axis: usize) -> Vec<([u32; 2], [f64; 2])> {
+/// Pairs of leaves of which the one's box ends where the other's begins along an axis, and both
+/// coordinates: within [`NEAR`] of each other for two inputs, equal within one input, whose cuts are
+/// exact. Leaves that are flat along the axis are not cut across it.
+fn touching_leaves(scene: &Scene, axis: usize) -> Vec<([u32; 2], [f64; 2])> {
     let node = |leaf: u32| &scene.nodes[leaf as usize];
     let is_flat = |leaf: u32| node(leaf).bbox_max[axis] - node(leaf).bbox_min[axis] <= 2.0 * NEAR;
     let begins = |leaf: u32| node(leaf).bbox_min[axis] + 0.0;
@@ -87,7 +91,8 @@ fn touching_inputs(scene: &Scene, axis: usize) -> Vec<([u32; 2], [f64; 2])> {
             node(a).bbox_min[at] - NEAR <= node(b).bbox_max[at]
                 && node(b).bbox_min[at] - NEAR <= node(a).bbox_max[at]
         };
-        (0..3).all(overlap) && input_of(scene, a) != input_of(scene, b)
+        let is_cut = node(a).bbox_max[axis] == node(b).bbox_min[axis];
+        (0..3).all(overlap) && (is_cut || input_of(scene, a) != input_of(scene, b))
     };
     let beside = |&a: &u32| {
         let end = node(a).bbox_max[axis] + 0.0;
@@ -191,9 +196,10 @@ mod tests {
         Scene { nodes, ..scene() }
     }
 
-    /// What one scan has along a line need not have an edge in common with what another has there.
+    /// What a source has on one side of a cut need not have an edge in common with what it has on the
+    /// other; nor need what another scan has there, which may be a little beside it.
     #[test]
-    fn inputs_are_apart_where_their_leaves_touch() {
+    fn nodes_are_apart_where_their_leaves_touch() {
         let of_inputs = |inputs: [&str; 2]| {
             let mut scene = apart_at_5();
             let block = scene.blocks[0].clone();
@@ -208,15 +214,18 @@ mod tests {
             scene
         };
         let scene = of_inputs(["west.obj", "east.obj"]);
-        assert_eq!(touching_inputs(&scene, 0), [([3, 4], [5.0, 5.0])]);
-        assert_eq!(touching_inputs(&scene, 1), []);
-        assert_eq!(touching_inputs(&of_inputs(["west.obj"; 2]), 0), [], "one input");
-        let changed = |change: &dyn Fn(&mut Node)| {
+        assert_eq!(touching_leaves(&scene, 0), [([3, 4], [5.0, 5.0])]);
+        assert_eq!(touching_leaves(&scene, 1), []);
+        assert_eq!(touching_leaves(&of_inputs(["west.obj"; 2]), 0), [([3, 4], [5.0, 5.0])]);
+        let changed_in = |scene: &Scene, change: &dyn Fn(&mut Node)| {
             let mut scene = scene.clone();
             change(&mut scene.nodes[4]);
-            touching_inputs(&scene, 0)
+            touching_leaves(&scene, 0)
         };
+        let changed = |change: &dyn Fn(&mut Node)| changed_in(&scene, change);
         assert_eq!(changed(&|node| node.bbox_min[0] = 5.004), [([3, 4], [5.0, 5.004])]);
+        let of_one = of_inputs(["west.obj"; 2]);
+        assert_eq!(changed_in(&of_one, &|node| node.bbox_min[0] = 5.004), []);
         assert_eq!(changed(&|node| node.bbox_min[0] = 5.1), []);
         assert_eq!(changed(&|node| node.bbox_min[1] = 9.1), [], "passes it by");
         assert_eq!(changed(&|node| node.bbox_max[0] = 5.0), [], "flat");
@@ -228,7 +237,12 @@ mod tests {
             skirts: vec![true],
             ..NodeGeometry::default()
         };
-        for (scene, is_surface) in [(of_inputs(["west.obj"; 2]), true), (scene, false)] {
+        let apart = {
+            let mut scene = scene.clone();
+            scene.nodes[4].bbox_min[0] = 5.1;
+            scene
+        };
+        for (scene, is_surface) in [(apart, true), (scene, false), (of_one, false)] {
             let mut geometry = vec![NodeGeometry::default(); 5];
             geometry[1] = with_skirt.clone();
             mark(&scene, &mut geometry, [&[], &[]], &[1e-6; 5]);
