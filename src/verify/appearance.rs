@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::color_regions::{ColorRegions, ComparedPoint};
 use super::distance::{FrontDistances, ShownAt};
 use super::geometry::NodeGeometry;
 use super::node_textures::{NodePoint, NodeTextures};
@@ -121,34 +122,37 @@ pub(super) fn level(
     let mut shown: Vec<(u32, ShownAt)> = shown.collect();
     shown.sort_by_key(|&(number, shown)| (shown.node, number));
     let groups: Vec<_> = shown.chunk_by(|a, b| a.1.node == b.1.node).collect();
-    let sums: Vec<(f64, u64, TileFigures)> = groups
+    let colors: Vec<(Vec<Option<Color>>, f64)> = groups
         .par_iter()
         .map(|group| {
             let node = group[0].1.node;
             let at: Vec<NodePoint> = group.iter().map(|(_, shown)| shown.at).collect();
             let colors = images.colors(node, &at);
-            let scale = texel_scale(scene, geometry, node);
-            let mut found = (0.0, 0, TileFigures::default());
-            for (&(number, _), color) in group.iter().zip(colors) {
-                add(&mut found, number as usize, color, scale, reference);
-            }
             done();
-            found
+            (colors, texel_scale(scene, geometry, node))
         })
         .collect();
     let mut all = (0.0, 0, TileFigures::default());
-    for (squares, compared, tiles) in sums {
-        all.0 += squares;
-        all.1 += compared;
-        all.2.extend(&tiles);
+    let mut compared = Vec::with_capacity(points.all.len());
+    let mut compare = |number: u32, node: u32, color: Option<Color>, scale: f64| {
+        add(&mut all, number as usize, color, scale, reference);
+        if let (Some(shown), Some(source)) = (color, reference.color[number as usize]) {
+            compared.push(ComparedPoint { number, node, shown, source });
+        }
+    };
+    for (group, (colors, scale)) in groups.iter().zip(colors) {
+        for (&(number, ShownAt { node, .. }), color) in group.iter().zip(colors) {
+            compare(number, node, color, scale);
+        }
     }
-    for (number, _) in below.iter().enumerate().filter(|(_, below)| !**below) {
-        add(&mut all, number, leaf_shown[number], 1.0, reference);
+    for (number, _) in (0..).zip(&below).filter(|(_, below)| !**below) {
+        compare(number, points.leaf[number as usize], leaf_shown[number as usize], 1.0);
     }
     let colored = reference.color.iter().filter(|color| color.is_some()).count();
     LevelAppearance {
         color_rms: (all.1 > 0).then(|| (all.0 / all.1 as f64).sqrt()),
         color_share: (colored > 0).then(|| all.1 as f64 / colored as f64),
+        regions: ColorRegions::new(scene, points, &compared),
         tiles: (!reference.tile.is_empty()).then_some(all.2),
     }
 }
@@ -159,6 +163,8 @@ pub(super) struct LevelAppearance {
     pub color_rms: Option<f64>,
     /// The share of the source's coloured points that it is of: those for which something stands.
     pub color_share: Option<f64>,
+    /// Where its mean colour is another.
+    pub regions: ColorRegions,
     /// Tiles of generated cities.
     pub tiles: Option<TileFigures>,
 }
@@ -235,4 +241,45 @@ fn texel_scale(scene: &Scene, geometry: &[NodeGeometry], node: u32) -> f64 {
         open.extend(scene.children(next));
     }
     if own > 0 { (below as f64 / own as f64).sqrt().max(1.0) } else { 1.0 }
+}
+
+/// Check: the levels have the source's colours, but for regions that are a small share of the surface.
+pub(super) fn level_colors(
+    scene: &Scene,
+    levels: &[(u32, ColorRegions)],
+    limits: &Limits,
+) -> Check {
+    let mut check = Check::new("colours of the levels");
+    let hint = "look at this level: it shows another material than the source";
+    for (level, regions) in levels {
+        let (Some(share), Some((node, count, at))) = (regions.wrong_share(), regions.worst) else {
+            continue;
+        };
+        let what = format!(
+            "{:.1} % of the surface has another colour than the source, by more than 64 of 255 over \
+             the node's error squared, limit {:.0} %; {:.0} % of that in {}, as at {:.2} {:.2} {:.2}",
+            share * 100.0,
+            limits.other_color * 100.0,
+            100.0 * count as f64 / regions.wrong as f64,
+            scene.nodes[node as usize].file,
+            at.x,
+            at.y,
+            at.z
+        );
+        if share > limits.other_color {
+            check.fail(format!("level {level}"), what, hint);
+        } else if share > limits.other_color_warning {
+            check.warn(format!("level {level}"), what, hint);
+        }
+    }
+    let shares = levels.iter().map(|(_, regions)| match regions.wrong_share() {
+        Some(share) => format!("{:.1} %", share * 100.0),
+        None => "-".into(),
+    });
+    let shares: Vec<String> = shares.collect();
+    check.summary = match &shares[..] {
+        [] => "all nodes are leaves".into(),
+        shares => format!("of another colour than the source, by level: {}", shares.join(", ")),
+    };
+    check
 }

@@ -4,13 +4,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::assembly::Assembly;
+use super::coverage::{Group, coverage};
 use super::geometry::NodeGeometry;
-use super::options::Limits;
 use super::points::Points;
 use super::progress::Progress;
 use super::report::{Check, LeafFigures};
 use super::sample::area;
-use super::seams::Seam;
 use super::source::Source;
 use super::step::vertex_bounds;
 use crate::format::Scene;
@@ -22,14 +21,7 @@ use crate::lattice::Quantization;
 /// on its scene's last level. Where the scene is quantised, errors contain the rounding: then a
 /// leaf's error is its bound, where that is less, a coarse node's has room for skirts alone.
 pub(super) fn rounding(scene: &Scene, node: u32, step: f64, vertex_bound: f64) -> f64 {
-    let factor = scene.parameters["level_factor"].as_u64().unwrap_or(4).clamp(2, 64);
-    let cuts_each = factor.next_power_of_two().ilog2();
-    let level = match &scene.nodes[node as usize] {
-        leaf if leaf.first_child.is_none() => leaf.level,
-        _ => scene.level_count().saturating_sub(1) as u32,
-    };
-    let of_cuts = step * (0.5 * f64::from(level * cuts_each) + LAST_BITS);
-    let bound = (vertex_bound + of_cuts) * 3f64.sqrt();
+    let bound = vertex_bound * 3f64.sqrt() + rounding_of_cuts(scene, node, step);
     match (Quantization::of(&scene.parameters), &scene.nodes[node as usize]) {
         (None, _) => bound,
         (Some(_), leaf) if leaf.first_child.is_none() => {
@@ -37,6 +29,18 @@ pub(super) fn rounding(scene: &Scene, node: u32, step: f64, vertex_bound: f64) -
         }
         (Some(_), _) => step * (SKIRTS + LAST_BITS),
     }
+}
+
+/// How far the cuts on the way to a leaf may move a vertex, metres: half a step along each axis for
+/// each. A coarse node counts as a leaf on its scene's last level.
+fn rounding_of_cuts(scene: &Scene, node: u32, step: f64) -> f64 {
+    let factor = scene.parameters["level_factor"].as_u64().unwrap_or(4).clamp(2, 64);
+    let cuts_each = factor.next_power_of_two().ilog2();
+    let level = match &scene.nodes[node as usize] {
+        leaf if leaf.first_child.is_none() => leaf.level,
+        _ => scene.level_count().saturating_sub(1) as u32,
+    };
+    step * (0.5 * f64::from(level * cuts_each) + LAST_BITS) * 3f64.sqrt()
 }
 
 /// Room for the last bits of f64 in coordinates, as a share of a step.
@@ -57,10 +61,8 @@ pub(super) fn faithful(
     source: &Source,
     leaves: &[u32],
     geometry: &[NodeGeometry],
-    seams: &[Seam],
     points: &Points,
     steps: &[f64],
-    limits: &Limits,
     progress: &dyn Progress,
 ) -> (LeafFigures, Check) {
     let mut check = Check::new("faithful leaves");
@@ -93,23 +95,40 @@ pub(super) fn faithful(
                 .sum(),
         );
     }
-    let (expected_area, of_rounding) = match figures.rounded_area {
-        Some(area) => (area, seams.iter().map(|seam| seam.length() * coarsest).sum()),
-        None => (figures.source_area, rounded_area(source, coarsest)),
-    };
+    let expected_area = figures.rounded_area.unwrap_or(figures.source_area);
     figures.area_difference = (figures.leaf_area / expected_area - 1.0).abs();
-    let room = limits.area + of_rounding / expected_area;
-    if figures.area_difference.is_nan() || figures.area_difference > room {
-        let LeafFigures { leaf_area, area_difference, .. } = figures;
+
+    progress.phase("leaves on the source", leaves.len() as u64);
+    let moved: Vec<f64> = leaves
+        .iter()
+        .map(|&leaf| match (lattice, steps[leaf as usize]) {
+            (Some(_), step) => rounding_of_cuts(scene, leaf, step),
+            (None, step) => rounding(scene, leaf, step, bounds[leaf as usize]),
+        })
+        .collect();
+    let reference = if lattice.is_some() { source.built() } else { surface };
+    let coverage = coverage(reference, leaves, geometry, &moved, || progress.done(1));
+    let wrong = coverage.groups.iter().filter(|group| group.is_wrong());
+    for Group { triangle, source, leaves, bound } in wrong {
+        figures.wrong_triangles += 1;
+        let at = reference.corners(*triangle)[0];
         check.fail(
-            "all leaves",
-            format!(
-                "area {leaf_area:.6} m² instead of the source's {expected_area:.6} m²: off by \
-                 {area_difference:.1e}, limit {room:.0e}"
-            ),
+            format!("source triangle at {} {} {}", at.x, at.y, at.z),
+            format!("the leaves have {leaves:.6} m² of its {source:.6} m², limit ±{bound:.1e} m²"),
             HINT,
         );
     }
+    for (leaf, _, at) in &coverage.strays {
+        figures.wrong_triangles += 1;
+        check.fail(
+            &scene.nodes[*leaf as usize].file,
+            format!("no source triangle is near its triangle at {} {} {}", at.x, at.y, at.z),
+            HINT,
+        );
+    }
+    let unseen = coverage.groups.iter().filter(|group| group.source <= group.bound);
+    figures.unseen_triangles = unseen.clone().count() as u64;
+    figures.unseen_area = unseen.map(|group| group.source).sum();
 
     progress.phase("looking for vertices", surface.positions().len() as u64);
     let sought = match lattice {
@@ -189,8 +208,11 @@ pub(super) fn faithful(
         }
     }
     check.summary = format!(
-        "area off by {:.1e}; {} of {} source vertices missing ({} of thin triangles not sought), \
-         bound {:.1e} m along each axis; leaves at most {:.1e} m from the source",
+        "{} source triangles are not covered once ({} too small to tell); area off by {:.1e}; \
+         {} of {} source vertices missing ({} of thin triangles not sought), bound {:.1e} m along \
+         each axis; leaves at most {:.1e} m from the source",
+        figures.wrong_triangles,
+        figures.unseen_triangles,
         figures.area_difference,
         figures.missing_vertices,
         figures.source_vertices,
@@ -199,25 +221,6 @@ pub(super) fn faithful(
         figures.farthest,
     );
     (figures, check)
-}
-
-/// How much the area of the source may change where corners are rounded to a step: of all triangles
-/// together by three deviations of what a step along the longest side does to each. Thin ones do
-/// not cancel each other, since no area is below 0: theirs add up.
-fn rounded_area(source: &Source, step: f64) -> f64 {
-    let surface = &source.surface;
-    let (mut squares, mut thin) = (0.0, 0.0);
-    for triangle in 0..surface.triangles().len() as u32 {
-        let corners @ [a, b, c] = surface.corners(triangle);
-        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        let change = longest * step;
-        if area(corners) < change {
-            thin += change;
-        } else {
-            squares += change * change;
-        }
-    }
-    thin + 3.0 * f64::sqrt(squares)
 }
 
 /// Vertices of triangles whose corners stay apart when rounded. The build leaves out triangles

@@ -3,13 +3,14 @@
 //!
 //! | file | what it checks |
 //! |---|---|
+//! | `second_reader` | the importer against a second reader |
 //! | `structure` | the tree, every file, every attribute |
-//! | `faithful` | leaves against the source: area, vertices, surface |
+//! | `faithful`, `coverage` | leaves against the source: triangles, vertices, surface |
 //! | `joints` | leaves meet edge to edge |
-//! | `appearance` | leaves' texels; colours and tiles of every level |
+//! | `appearance`, `color_regions` | leaves' texels; colours and tiles of every level |
 //! | `distance` | each level against the source |
 //! | `node_errors`, `errors` | each node against the leaves below it; stored against measured errors |
-//! | `seams`, `cut_planes`, `border`, `gaps`, `slits` | what shows where two levels meet |
+//! | `seams`, `cut_planes`, `border`, `gaps` | what shows where two levels meet |
 //!
 //! Without a source the leaves stand for it, and what needs it is not checked. Triangles of all
 //! nodes are kept in memory (some 30 bytes each), and the source with its search tree (some 100
@@ -19,6 +20,8 @@ mod appearance;
 mod assembly;
 mod border;
 mod cells;
+mod color_regions;
+mod coverage;
 mod cut_planes;
 mod distance;
 mod distance_stats;
@@ -40,7 +43,7 @@ mod progress;
 mod report;
 mod sample;
 mod seams;
-mod slits;
+mod second_reader;
 mod source;
 mod source_colors;
 mod step;
@@ -102,7 +105,6 @@ pub fn verify(
         errors: Vec::new(),
         worst_nodes: Vec::new(),
         gaps: Vec::new(),
-        slits: Vec::new(),
         cells: Vec::new(),
     };
     let path = out.join(SCENE_FILE);
@@ -147,6 +149,9 @@ impl Verification<'_> {
         report.other_sources = other_sources::other_sources(out, sources)?;
         let (mut geometry, check) = structure::structure(out, scene, &options.limits, progress);
         report.checks.push(check);
+        if let Some(source) = &source {
+            report.checks.push(second_reader::check(&source.second_readings));
+        }
         if let Some((check, seen)) = cells::cells(out, scene, options, progress) {
             report.checks.push(check);
             report.cells = seen;
@@ -168,9 +173,8 @@ impl Verification<'_> {
         progress.phase("images of the leaves", leaves.len() as u64);
         let shown = appearance::leaf_colors(&leaves, &points, &images, || progress.done(1));
         let reference = match &source {
-            Some(source) => self.against_source(
-                source, &leaves, &geometry, &rims, &seams, &points, &steps, &shown, report,
-            ),
+            Some(source) => self
+                .against_source(source, &leaves, &geometry, &rims, &points, &steps, &shown, report),
             None => Reference { color: shown.clone(), tile: Vec::new() },
         };
         self.levels(
@@ -197,7 +201,6 @@ impl Verification<'_> {
         );
         report.gaps = figures;
         report.checks.push(check);
-        report.slits = slits::slits(scene, &geometry, &open, progress);
         Ok(())
     }
 
@@ -208,7 +211,6 @@ impl Verification<'_> {
         leaves: &[u32],
         geometry: &[NodeGeometry],
         rims: &seams::Rims,
-        seams: &[seams::Seam],
         points: &Points,
         steps: &[f64],
         shown: &[Option<surface_appearance::Color>],
@@ -216,9 +218,8 @@ impl Verification<'_> {
     ) -> Reference {
         let Self { scene, options, progress, .. } = *self;
         let limits = &options.limits;
-        let (mut figures, check) = faithful::faithful(
-            scene, source, leaves, geometry, seams, points, steps, limits, progress,
-        );
+        let (mut figures, check) =
+            faithful::faithful(scene, source, leaves, geometry, points, steps, progress);
         report.checks.push(check);
         report.checks.push(joints::joints(scene, source, rims, steps));
         progress.phase("images of the source", 1);
@@ -279,7 +280,7 @@ impl Verification<'_> {
             let seed = options.seed;
             let distances =
                 distance::measure(scene, front, leaves, geometry, points, surface, seed, progress);
-            let LevelAppearance { color_rms, color_share, tiles } = appearance::level(
+            let LevelAppearance { color_rms, color_share, regions, tiles } = appearance::level(
                 scene,
                 &distances,
                 points,
@@ -291,14 +292,20 @@ impl Verification<'_> {
             );
             let figures = self.level_figures(front, level, geometry, &distances, diagonal);
             let kept = kept(front);
-            (LevelFigures { kept, color_rms, color_share, tiles, ..figures }, distances.nodes)
+            let other_color_share = regions.wrong_share();
+            let figures =
+                LevelFigures { kept, color_rms, color_share, other_color_share, tiles, ..figures };
+            (figures, distances.nodes, regions)
         };
+        let mut regions = Vec::new();
         for level in 0..tree::coarse_levels(scene) {
             progress.phase(&format!("level {level}"), leaves.len() as u64);
-            let (figures, nodes) = measure(&Front::level(scene, level), Some(level));
+            let (figures, nodes, of_level) = measure(&Front::level(scene, level), Some(level));
             report.levels.push(figures);
             all.extend(nodes);
+            regions.push((level, of_level));
         }
+        report.checks.push(appearance::level_colors(scene, &regions, &options.limits));
         if let Some(share) = options.front {
             let triangles = report.scene.as_ref().map_or(0, |facts| facts.leaf_triangles);
             let front = Front::of_size(scene, (triangles as f64 * share) as u64);

@@ -62,8 +62,6 @@ pub struct Limits {
     /// Relative difference between a stored attribute and its recomputation: room for the last
     /// bits of sums.
     pub attribute: f64,
-    /// Relative difference of the area of leaves and source, beside what rounding may change.
-    pub area: f64,
     /// Stored error over measured error, at most this in the median of the nodes of each level.
     pub median_error_ratio: f64,
     /// The same at the 95th percentile.
@@ -80,6 +78,10 @@ pub struct Limits {
     pub wrong_tiles: f64,
     /// Likewise for a single leaf: a few of its samples may lie where JPEG spoiled the number.
     pub leaf_wrong_tiles: f64,
+    /// Share of a level's surface that may have another colour than the source.
+    pub other_color: f64,
+    /// A level with a larger share is named, and does not fail.
+    pub other_color_warning: f64,
     /// Share of the pixels of what is far that may be missing where it is drawn from faces.
     pub missing_of_faces: f64,
     /// Share of them that may show something else, or at another distance.
@@ -93,7 +95,6 @@ impl Default for Limits {
     fn default() -> Self {
         Self {
             attribute: 1e-9,
-            area: 1e-6,
             median_error_ratio: 1.3,
             high_error_ratio: 2.0,
             texel_ratio: 1.5,
@@ -102,6 +103,8 @@ impl Default for Limits {
             leaf_texel_slack: 8.0,
             wrong_tiles: 0.01,
             leaf_wrong_tiles: 0.1,
+            other_color: 0.1,
+            other_color_warning: 0.02,
             missing_of_faces: 0.005,
             wrong_of_faces: 0.02,
             gap_steps: 4.0,

@@ -42,9 +42,6 @@ pub struct VerifyReport {
     pub worst_nodes: Vec<NodeFigures>,
     /// Widest gaps, for every pair of levels that meet somewhere; `a` ≤ `b`.
     pub gaps: Vec<GapFigures>,
-    /// Slits between borders of the source that touch without sharing vertices, for every pair of
-    /// levels that meet so somewhere; `a` ≤ `b`.
-    pub slits: Vec<SlitFigures>,
     /// Faces from corners that no picture was taken from, by cell; none where none was drawn.
     pub cells: Vec<SeenFaces>,
 }
@@ -89,6 +86,8 @@ pub struct Check {
     pub failures: Vec<Failure>,
     /// All failures.
     pub failure_count: u64,
+    /// What is doubtful and does not fail.
+    pub warnings: Vec<Failure>,
 }
 
 impl Check {
@@ -103,6 +102,13 @@ impl Check {
         self.failure_count += 1;
         if self.failures.len() < MOST_LISTED {
             self.failures.push(Failure { place: place.into(), what: what.into(), hint });
+        }
+    }
+
+    /// Notes what does not fail, but should be looked at.
+    pub fn warn(&mut self, place: impl Into<String>, what: impl Into<String>, hint: &'static str) {
+        if self.warnings.len() < MOST_LISTED {
+            self.warnings.push(Failure { place: place.into(), what: what.into(), hint });
         }
     }
 
@@ -136,6 +142,14 @@ pub struct LeafFigures {
     pub leaf_area: f64,
     /// `|leaf_area / source_area - 1|`, for a quantised scene against `rounded_area`.
     pub area_difference: f64,
+    /// Source triangles, or groups of coincident ones, whose area the leaves do not have once, and
+    /// triangles of leaves that lie on no source triangle.
+    pub wrong_triangles: u64,
+    /// Source triangles so small that rounding may take all of their area: the loss of one is not seen
+    /// by its area.
+    pub unseen_triangles: u64,
+    /// The area of these, square metres.
+    pub unseen_area: f64,
     /// Vertices of the source.
     pub source_vertices: u64,
     /// Of these, vertices of nothing but triangles about as thin as the lattice's step, which are
@@ -188,6 +202,10 @@ pub struct LevelFigures {
     /// The share of the source's points with a colour for which something stands, 0–1; floors of
     /// houses whose floors are gone have nothing.
     pub color_share: Option<f64>,
+    /// The share of the compared surface whose mean colour differs from the source's by more than 64 of
+    /// 255 in some channel, 0–1: the mean over regions as large as the node's error, or larger where
+    /// samples are few. `None` where nothing could be compared.
+    pub other_color_share: Option<f64>,
     /// Tiles of generated cities; `None` elsewhere.
     pub tiles: Option<TileFigures>,
 }
@@ -260,26 +278,6 @@ pub struct NodeFigures {
     pub to_source: Distance,
     /// Where the largest distance is, in source coordinates.
     pub farthest: [f64; 3],
-}
-
-/// Slits between nodes of two levels, or within nodes of one, where borders of the source touch
-/// without sharing vertices.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct SlitFigures {
-    /// Level on one side.
-    pub a: u32,
-    /// Level on the other.
-    pub b: u32,
-    /// Places where the source's borders touch.
-    pub points: u64,
-    /// Of these, those where the nodes are no farther apart than the source is.
-    pub closed: u64,
-    /// The source's widest slit there, metres.
-    pub widest_in_source: f64,
-    /// What 99 of 100 slits are narrower than, metres.
-    pub p99: f64,
-    /// The widest, metres.
-    pub widest: f64,
 }
 
 /// Widest gaps between nodes of two levels that meet at a cut.

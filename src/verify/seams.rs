@@ -26,11 +26,6 @@ pub(super) struct Seam {
 }
 
 impl Seam {
-    /// Its length, metres.
-    pub fn length(&self) -> f64 {
-        self.ends[0].distance(self.ends[1])
-    }
-
     /// How far its ends are apart as the two leaves have them, at most; metres.
     pub fn apart(&self) -> f64 {
         let apart = |end: usize| self.ends[end].distance(self.other_ends[end]);

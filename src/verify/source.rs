@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::progress::Progress;
 use super::seams::open_edges;
+use super::second_reader::{Comparison, compare};
 use super::surface_appearance::SurfaceAppearance;
 use crate::import::{find_inputs, load};
 use crate::lattice::Quantization;
@@ -21,6 +22,8 @@ pub(super) struct Source {
     pub surface: Surface,
     /// The same with vertices rounded to the lattice of a quantised scene.
     rounded: Option<Surface>,
+    /// What a second reader found in the files.
+    pub second_readings: Vec<Comparison>,
     models: Vec<Model>,
     parts: Vec<PartPlace>,
     /// Number of each model's first image.
@@ -48,8 +51,10 @@ impl Source {
         progress.phase("reading the source", inputs.len() as u64 + 1);
         let (mut positions, mut triangles): (Vec<DVec3>, Vec<[u32; 3]>) = Default::default();
         let (mut models, mut parts, mut first_texture) = (Vec::new(), Vec::new(), vec![0]);
+        let mut second_readings = Vec::with_capacity(inputs.len());
         for input in &inputs {
             let mut model = load(input)?;
+            second_readings.push(compare(input, &model));
             placement.localise(&mut model, up)?;
             for (number, part) in (0..).zip(&mut model.parts) {
                 let first_vertex = positions.len() as u32;
@@ -73,7 +78,7 @@ impl Source {
         }
         let surface = Surface::new(positions, triangles);
         progress.done(1);
-        Ok(Self { surface, rounded: None, models, parts, first_texture })
+        Ok(Self { surface, rounded: None, second_readings, models, parts, first_texture })
     }
 
     /// Makes it known on what lattice the scene lies.

@@ -34,8 +34,8 @@ pub fn text(report: &VerifyReport) -> String {
     if !report.levels.is_empty() {
         line(format!(
             "\nDistance of each level, with the leaves above it, to the source, two-sided, in metres and in 1e-4 of the diagonal; \
-             ground covered and skylines kept; colour RMS of 255\n\
-             {:>5} {:>7} {:>7} {:>10} {:>9} {:>7} {:>9} {:>7} {:>9} {:>7} {:>7} {:>7} {:>7} {:>12}",
+             ground covered and skylines kept; colour RMS of 255, and surface of another colour\n\
+             {:>5} {:>7} {:>7} {:>10} {:>9} {:>7} {:>9} {:>7} {:>9} {:>7} {:>7} {:>7} {:>7} {:>7} {:>12}",
             "level",
             "nodes",
             "leaves",
@@ -49,6 +49,7 @@ pub fn text(report: &VerifyReport) -> String {
             "area %",
             "skyl. %",
             "colour",
+            "other %",
             "wrong tiles"
         ));
         let levels = report.levels.iter().map(|figures| (figures.level.to_string(), figures));
@@ -64,7 +65,7 @@ pub fn text(report: &VerifyReport) -> String {
                 _ => "too coarse".into(),
             });
             line(format!(
-                "{:>5} {:>7} {:>7} {:>10} {:>9.4} {:>7.3} {:>9.4} {:>7.3} {:>9.4} {:>7.2} {:>7} {:>7} {:>7} {:>12}",
+                "{:>5} {:>7} {:>7} {:>10} {:>9.4} {:>7.3} {:>9.4} {:>7.3} {:>9.4} {:>7.2} {:>7} {:>7} {:>7} {:>7} {:>12}",
                 name,
                 level.nodes,
                 level.leaves_above,
@@ -78,6 +79,7 @@ pub fn text(report: &VerifyReport) -> String {
                 percent(level.kept.area),
                 percent(level.kept.skyline),
                 color,
+                percent(level.other_color_share),
                 tiles
             ));
         }
@@ -112,28 +114,9 @@ pub fn text(report: &VerifyReport) -> String {
             ));
         }
     }
-    if !report.slits.is_empty() {
-        line(format!(
-            "\nSlits where borders of the source touch without sharing vertices\n{:>7} {:>10} {:>9} {:>14} {:>10} {:>10}",
-            "levels", "places", "closed", "in source m", "99 % m", "widest m"
-        ));
-        for slit in &report.slits {
-            let closed = slit.closed as f64 / slit.points.max(1) as f64;
-            line(format!(
-                "{:>3} | {:<1} {:>10} {:>7.1} % {:>14.4} {:>10.4} {:>10.4}",
-                slit.a,
-                slit.b,
-                slit.points,
-                100.0 * closed,
-                slit.widest_in_source,
-                slit.p99,
-                slit.widest
-            ));
-        }
-    }
     line(String::new());
     for check in &report.checks {
-        line(format!("{}  {}: {}", verdict(check.passed), check.name, check.summary));
+        line(format!("{}  {}: {}", verdict(check), check.name, check.summary));
         failures(check, &mut line);
     }
     line(format!("\n{}", if report.passed { "PASS" } else { "FAIL" }));
@@ -148,16 +131,25 @@ fn failures(check: &Check, line: &mut impl FnMut(String)) {
     if more > 0 {
         line(format!("        … and {more} more"));
     }
-    let mut hints: Vec<&str> = check.failures.iter().map(|failure| failure.hint).collect();
+    for warning in &check.warnings {
+        line(format!("        warning: {}: {}", warning.place, warning.what));
+    }
+    let noted = check.failures.iter().chain(&check.warnings);
+    let mut hints: Vec<&str> = noted.map(|failure| failure.hint).collect();
     hints.dedup();
     for hint in hints {
         line(format!("        try: {hint}"));
     }
 }
 
-fn verdict(passed: bool) -> &'static str {
-    if passed { "pass" } else { "FAIL" }
+fn verdict(check: &Check) -> &'static str {
+    match (check.passed, check.warnings.is_empty()) {
+        (true, true) => "pass",
+        (true, false) => "warn",
+        (false, _) => "FAIL",
+    }
 }
+
 /// A share in percent, as tables have it.
 fn percent(share: Option<f64>) -> String {
     share.map_or("-".into(), |share| format!("{:.1}", share * 100.0))

@@ -117,7 +117,10 @@ impl<'a> Walk<'a> {
             if best.0 <= enough || leaves == MOST_LEAVES { -1.0 } else { reach(best.0) }
         });
         let (distance, near) = best;
-        self.found = self.found.max(distance);
+        // Others may be nearer than one that is near enough.
+        if distance > enough {
+            self.found = distance;
+        }
         self.near = near;
         distance.is_finite().then_some(near)
     }
@@ -231,7 +234,8 @@ mod tests {
             let least = of_vertices(&fine, &coarse_surface);
             assert!(exact.bound >= least.min(exact.found), "{bump}: {exact:?} {least}");
             assert!(exact.bound == 0.0 || exact.bound >= least, "{bump}: {exact:?} {least}");
-            assert!(exact.bound <= 1.2 * least.max(exact.found), "{bump}: {exact:?} {least}");
+            let most = 1.2 * least.max(exact.found) + 1.1 * NONE * 64.0;
+            assert!(exact.bound <= most, "{bump}: {exact:?} {least}");
             assert!(exact.bound > 0.0 || least < 1e-6, "{bump}: {exact:?} {least}");
             let measured = super::super::surface_error(&fine_surface, &coarse);
             assert!(measured.bound >= exact.found, "{bump}: {measured:?} {exact:?}");

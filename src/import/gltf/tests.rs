@@ -815,7 +815,7 @@ fn normals_turn_with_their_node() {
         json!({}),
         json!({"scale": [-1, 1, 1]}),
         json!({"scale": [2, 1, 1]}),
-        json!({"rotation": [0, 0, 0.7071067811865476, 0.7071067811865476]}),
+        json!({"rotation": [0.0, 0.0, 0.5_f64.sqrt(), 0.5_f64.sqrt()]}),
         json!({"scale": [3, 3, -3]}),
     ];
     let (found, model) = tilted([[0.6, 0.0, 0.8]; 4], &nodes).unwrap();

@@ -580,7 +580,7 @@ fn normals_of_untextured_faces_are_kept() {
 
 #[test]
 fn normals_without_a_use_are_dropped() {
-    let flat = read(&format!("{SQUARE}vn 0 0 1\nf 1//1 2//1 3//1 4//1\n"), &[]).unwrap();
+    let flat = read(format!("{SQUARE}vn 0 0 1\nf 1//1 2//1 3//1 4//1\n"), &[]).unwrap();
     assert!(flat.parts[0].normals.is_empty());
     let files = [("a.mtl", "newmtl t\nmap_Kd t.png\nnewmtl u\n"), ("t.png", "")];
     let textured = format!("{SQUARE}vn 1 0 1\nusemtl t\nf 1//1 2//1 3//1\n");

@@ -1,0 +1,97 @@
+//! `hlod-build verify`: a level that shows another material than the source is found.
+
+use std::fmt::Write;
+
+use hlod::builder::hierarchy::HierarchyOptions;
+use hlod::builder::progress::Silent;
+use hlod::builder::{BuildOptions, build};
+use hlod::format::Scene;
+
+use crate::support::inputs::write;
+use crate::verify::{Broken, failed};
+
+/// A track of asphalt between two strips of grass, `side` by `side` quads of 1 m.
+fn write_track(folder: &std::path::Path, side: usize) -> std::path::PathBuf {
+    let mtl = "newmtl asphalt\nKd 0.35 0.35 0.37\nnewmtl grass\nKd 0.3 0.75 0.2\n";
+    write(folder, "track.mtl", mtl);
+    let mut text = String::from("mtllib track.mtl\n");
+    for i in 0..=side {
+        for j in 0..=side {
+            let height = ((i * 7 + j * 13) % 5) as f64 * 0.02;
+            let _ = writeln!(text, "v {i} {j} {height}");
+        }
+    }
+    for i in 0..side {
+        let is_track = (side / 3..side - side / 3).contains(&i);
+        let _ = writeln!(text, "usemtl {}", if is_track { "asphalt" } else { "grass" });
+        for j in 0..side {
+            let at = |i: usize, j: usize| i * (side + 1) + j + 1;
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            let _ = writeln!(text, "f {a} {b} {c} {d}");
+        }
+    }
+    write(folder, "track.obj", text)
+}
+
+fn track() -> Broken {
+    let folder = tempfile::tempdir().unwrap();
+    let input = write_track(folder.path(), 30);
+    let out = tempfile::tempdir().unwrap();
+    let hierarchy = HierarchyOptions { desired_tris: 200, ..HierarchyOptions::default() };
+    let options = BuildOptions { hierarchy, ..BuildOptions::default() };
+    build(&[input], out.path(), &options, &Silent).unwrap();
+    let scene = Scene::read(out.path()).unwrap();
+    Broken { out, scene }
+}
+
+/// Paints the primitives of the root for which `chosen` holds by the colour of their first vertex.
+fn painted(paint: impl Fn([f64; 3]) -> [f64; 3]) -> hlod::verify::VerifyReport {
+    let mut broken = track();
+    let root = broken.scene.nodes.iter().position(|node| node.parent.is_none()).unwrap();
+    broken.rewrite(root, |mesh| {
+        for primitive in &mut mesh.primitives {
+            let base = primitive.surface.base_color;
+            let is_plain = primitive.colors.is_empty();
+            let vertices = primitive.positions.len();
+            let color = |vertex: usize| {
+                let color = primitive.colors.get(vertex).copied().unwrap_or([u16::MAX; 4]);
+                paint([0, 1, 2].map(|i| f64::from(base[i]) * f64::from(color[i]) / 65535.0))
+            };
+            let colors: Vec<[f64; 3]> = (0..vertices).map(color).collect();
+            if is_plain {
+                let [r, g, b] = colors[0].map(|light| light as f32);
+                primitive.surface.base_color = [r, g, b, 1.0];
+            } else {
+                primitive.surface.base_color = [1.0; 4];
+                primitive.colors = colors
+                    .iter()
+                    .map(|&[r, g, b]| [r, g, b, 1.0].map(|light| (light * 65535.0) as u16))
+                    .collect();
+            }
+        }
+    });
+    broken.report(false)
+}
+
+fn is_grass([red, green, _]: [f64; 3]) -> bool {
+    green > 2.0 * red
+}
+
+const GRASS: [f64; 3] = [0.073, 0.522, 0.033];
+const ASPHALT: [f64; 3] = [0.101, 0.101, 0.113];
+
+#[test]
+fn a_level_in_the_right_materials_passes_and_one_in_the_wrong_ones_does_not() {
+    let right = painted(|color| color);
+    assert!(right.passed, "{}", hlod::verify::text(&right));
+    let share = |report: &hlod::verify::VerifyReport| report.levels[0].other_color_share.unwrap();
+    assert!(share(&right) < 0.02, "{}", hlod::verify::text(&right));
+
+    let third = painted(|_| GRASS);
+    assert_eq!(failed(&third), ["colours of the levels"]);
+    assert!((share(&third) - 1.0 / 3.0).abs() < 0.08, "{}", share(&third));
+
+    let swapped = painted(|color| if is_grass(color) { ASPHALT } else { GRASS });
+    assert_eq!(failed(&swapped), ["colours of the levels"]);
+    assert!(share(&swapped) > 0.9, "{}", share(&swapped));
+}
