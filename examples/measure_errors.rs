@@ -32,6 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             positions: mesh.positions.iter().map(local).collect(),
             texcoords: mesh.texcoords,
             colors: mesh.colors,
+            normals: mesh.normals,
             materials: mesh.materials,
             triangles: mesh.triangles,
         };

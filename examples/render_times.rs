@@ -121,6 +121,7 @@ fn ground(node: u32, across: u32, textured: bool) -> NodeMesh {
         positions: positions.collect(),
         texcoords: if textured { texcoords } else { Vec::new() },
         colors: Vec::new(),
+        normals: Vec::new(),
         indices: corners.collect(),
         skirt_triangles: 0,
         surface,

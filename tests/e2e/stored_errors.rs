@@ -181,7 +181,7 @@ fn errors(out: &Path, seed: u64, case: &str) -> Vec<[f64; 2]> {
         );
         ratios.push([stored, measured.max(1e-6 * extent)]);
     }
-    if seed % NAIVE == 0 {
+    if seed.is_multiple_of(NAIVE) {
         let built = Built::read(out);
         for (number, node) in built.scene.nodes.iter().enumerate() {
             if built.is_leaf(number) {
