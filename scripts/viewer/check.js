@@ -3,6 +3,7 @@
 const fs = require('fs');
 const path = require('path');
 const { chromium } = require('playwright-core');
+const { FLAGS, watch } = require('./browser.js');
 const { serve } = require('./server.js');
 
 const SIZE = { width: 960, height: 640 };
@@ -20,13 +21,6 @@ const LEAST_SHARE = { dense: 0.04, near: 0.15, sparse: 0.005 };
 const MOST_HUE = { textured: 0.05, lit: 0.1 };
 /** Brightness of the picture over that of the textures; lit surfaces may be in the shade. */
 const BRIGHTNESS = { textured: [0.6, 1.5], lit: [0.2, 1.5] };
-
-// WebGL on the processor, and no talk with anybody outside.
-const FLAGS = [
-    '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
-    '--ignore-gpu-blocklist', '--disable-quic', '--no-first-run', '--disable-background-networking',
-    '--disable-component-update', '--disable-sync', '--hide-scrollbars',
-];
 
 /** What stands in the picture: runs in the page. */
 function measure() {
@@ -78,21 +72,7 @@ async function picture(browser, url, file) {
 async function check(browser, url, folder, shots) {
     const faults = [];
     const page = await browser.newPage({ viewport: SIZE });
-    page.on('console', (message) => {
-        if (message.type() === 'error') {
-            faults.push(`console: ${message.text()}`);
-        }
-    });
-    page.on('pageerror', (error) => faults.push(`page: ${error.message}`));
-    page.on('requestfailed', (request) => faults.push(`request: ${request.url()} ${request.failure()?.errorText}`));
-    page.on('response', (response) => {
-        if (response.status() >= 400) {
-            faults.push(`request: ${response.url()} ${response.status()}`);
-        }
-    });
-    // Nothing but this machine.
-    await page.route((to) => to.hostname !== '127.0.0.1' && !['data:', 'blob:'].includes(to.protocol),
-        (route) => { faults.push(`asks for ${route.request().url()}`); return route.abort(); });
+    await watch(page, faults);
     const begin = performance.now();
     await page.goto(`${url}&check`);
     const place = await page.evaluate(() => window.hlod.place());
