@@ -51,12 +51,9 @@ fn tiles_of(source: &TextureSource) -> Option<(TileGrid, TileCode)> {
         TextureData::File(path) => path.file_stem()?.to_string_lossy().into_owned(),
         TextureData::Embedded(_) => source.name.clone(),
     };
-    let digits: String = {
-        let stem = name.rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem);
-        let tail = stem.rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
-        stem[tail..].to_owned()
-    };
-    let block: usize = digits.parse().ok()?;
+    let stem = name.rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem);
+    let before_digits = stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    let block: usize = stem[before_digits..].parse().ok()?;
     let image = decode_texture(source).ok()?;
     let grid = TileGrid::new([image.width, image.height]);
     let code = TileCode::new(block);
@@ -108,5 +105,19 @@ impl TileFigures {
     /// Share of the clear samples that show another tile; `None` where none is clear.
     pub fn wrong_share(&self) -> Option<f64> {
         (self.clear > 0).then(|| self.wrong as f64 / self.clear as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_images_may_be_in_any_script() {
+        for name in ["大地形", "地7形", "形7", "Straße.é", "7", ""] {
+            let data = TextureData::Embedded(Vec::new().into());
+            let source = TextureSource { name: name.to_owned(), data, opacity: None };
+            assert!(tiles_of(&source).is_none(), "{name}");
+        }
     }
 }

@@ -36,6 +36,10 @@ impl Default for Content {
     }
 }
 
+/// A material's colour counts as known where at most this share of its area is without one: what
+/// is degenerate, and sums in another order.
+const KNOWN: f64 = 1e-6;
+
 /// The surface of one material.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::verify) struct MaterialContent {
@@ -53,10 +57,11 @@ impl MaterialContent {
         }
     }
 
-    /// The mean colour, sRGB, 0–255; `None` where none is known.
+    /// The mean colour, sRGB, 0–255; `None` where that of some of the area is not known.
     pub fn mean_color(&self) -> Option<[f64; 3]> {
         let mean = |sum: f64| linear_to_srgb(sum / self.colored) * 255.0;
-        (self.colored > 0.0).then(|| self.light.map(mean))
+        let is_known = self.colored > 0.0 && self.colored >= self.area * (1.0 - KNOWN);
+        is_known.then(|| self.light.map(mean))
     }
 }
 

@@ -36,6 +36,9 @@ struct Reader<'a> {
 /// Reads a glTF or GLB file; or says why it is left alone.
 pub(super) fn read(file: &Path) -> Result<Content, String> {
     let bytes = std::fs::read(file).map_err(|error| error.to_string())?;
+    let unchecked =
+        Gltf::from_slice_without_validation(&bytes).map_err(|error| error.to_string())?;
+    check_accessors(unchecked.document.as_json())?;
     let Gltf { document, blob } = Gltf::from_slice(&bytes).map_err(|error| error.to_string())?;
     let is_understood =
         |name: &str| UNDERSTOOD.contains(&name) || name.starts_with("KHR_materials_");
@@ -67,6 +70,20 @@ pub(super) fn read(file: &Path) -> Result<Content, String> {
     Ok(reader.content)
 }
 
+/// Refuses primitives that name accessors that are not there: the crate's own validation indexes
+/// accessors by them.
+fn check_accessors(root: &gltf::json::Root) -> Result<(), String> {
+    let mut primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let is_missing = |primitive: &gltf::json::mesh::Primitive| {
+        let mut named = primitive.attributes.values().chain(&primitive.indices);
+        named.any(|accessor| accessor.value() >= root.accessors.len())
+    };
+    match primitives.any(is_missing) {
+        true => Err("a primitive names an accessor that is not there".into()),
+        false => Ok(()),
+    }
+}
+
 fn bytes_of(uri: &str, folder: &Path) -> Result<Vec<u8>, String> {
     if let Some((_, encoded)) =
         uri.strip_prefix("data:").and_then(|data| data.split_once(";base64,"))
@@ -83,6 +100,9 @@ impl Reader<'_> {
     fn node(&mut self, node: &gltf::Node, above: DMat4, depth: usize) -> Result<(), String> {
         if depth > DEEPEST {
             return Err(format!("nodes are more than {DEEPEST} deep"));
+        }
+        if node.skin().is_some() && node.mesh().is_some() {
+            return Err("has skins".into());
         }
         let columns = node.transform().matrix().map(|column| column.map(f64::from));
         let world = above * DMat4::from_cols_array_2d(&columns);

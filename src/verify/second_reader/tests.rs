@@ -69,6 +69,11 @@ fn vertex_colours_and_what_is_not_understood() {
     let colored = "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nf 1 2 3\n";
     let (_, _, check) = compared(&folder, colored);
     assert!(check.summary.contains("1 of 1 materials"), "{check:?}");
+    // The importer shows triangles without colours in white; the second reader leaves them alone.
+    let partly = format!("{}v 5 0 0\nv 6 0 0\nv 5 1 0\nf 1 2 3\nf 4 5 6\n", &colored[..42]);
+    let (_, model, check) = compared(&folder, &partly);
+    assert_eq!(model.triangle_count(), 2);
+    assert!(check.passed && check.summary.contains("0 of 1 materials"), "{check:?}");
     let doubtful = OBJ.replace("a.mtl", "b.mtl");
     fs::write(folder.path().join("b.mtl"), MTL.replace("t.png", "-s 2 2 1 t.png")).unwrap();
     let (_, _, check) = compared(&folder, &doubtful);
@@ -114,6 +119,25 @@ fn glb_files_are_read_again() {
     let path = glb(&folder, &instanced, &strip);
     let check = super::check(&[compare(&path, &load(&path).unwrap())]);
     assert!(check.summary.contains("uses EXT_mesh_gpu_instancing"), "{check:?}");
+    let skinned = json.replace(r#"{"mesh":0}]"#, r#"{"mesh":0,"skin":0}]"#).replacen(
+        "{",
+        r#"{"skins":[{"joints":[0]}],"#,
+        1,
+    );
+    let path = glb(&folder, &skinned, &strip);
+    let check = super::check(&[compare(&path, &load(&path).unwrap())]);
+    assert!(check.summary.contains("has skins"), "{check:?}");
+    // In a mesh that no node has, which the importer does not look at.
+    let unused = r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0,"mode":5}]},
+        {"primitives":[{"attributes":{"POSITION":7}}]}],"materials""#;
+    let [before, after] = [0, 1].map(|at| {
+        let start = json.find(r#""meshes""#).unwrap();
+        let end = json.find(r#""materials""#).unwrap() + r#""materials""#.len();
+        if at == 0 { &json[..start] } else { &json[end..] }
+    });
+    let path = glb(&folder, &format!("{before}{unused}{after}"), &strip);
+    let check = super::check(&[compare(&path, &load(&path).unwrap())]);
+    assert!(check.summary.contains("an accessor that is not there"), "{check:?}");
 }
 
 /// Real files are in a folder beside the project, where there is one.
