@@ -18,8 +18,8 @@ mod block;
 mod cache;
 mod charts;
 pub(crate) mod encode;
-#[cfg(feature = "render")]
 mod face_normals;
+#[cfg(feature = "render")]
 mod face_picture;
 mod fill;
 mod islands;
