@@ -18,6 +18,10 @@ use crate::mesh::Wrap;
 /// Extensions that change neither shape nor base colour, or whose colours are left alone.
 const UNDERSTOOD: [&str; 2] = ["KHR_texture_transform", "KHR_lights_punctual"];
 
+/// Extensions that move or hide triangles. Files that have them are left alone, also where
+/// `extensionsUsed` does not name them.
+const PLACING: [&str; 3] = ["EXT_mesh_gpu_instancing", "CESIUM_RTC", "KHR_node_visibility"];
+
 /// Nodes below nodes, at most: files may name nodes in a circle.
 const DEEPEST: usize = 256;
 
@@ -36,6 +40,10 @@ struct Reader<'a> {
 /// Reads a glTF or GLB file; or says why it is left alone.
 pub(super) fn read(file: &Path) -> Result<Content, String> {
     let bytes = std::fs::read(file).map_err(|error| error.to_string())?;
+    let is_named = |name: &&&str| memchr::memmem::find(&bytes, name.as_bytes()).is_some();
+    if let Some(name) = PLACING.iter().find(is_named) {
+        return Err(format!("uses {name}"));
+    }
     let unchecked =
         Gltf::from_slice_without_validation(&bytes).map_err(|error| error.to_string())?;
     check_accessors(unchecked.document.as_json())?;
