@@ -45,7 +45,7 @@ pub struct Session {
     occluders: Arc<Mutex<BTreeMap<u64, Arc<Occluders>>>>,
     /// For runs in which nothing is drawn.
     model_files: Arc<ModelFiles>,
-    /// What a look at all files found, once a run began.
+    /// Result of checking all files when the run began.
     broken: Arc<OnceLock<BrokenFiles>>,
     cells: Option<Arc<Cells>>,
 }

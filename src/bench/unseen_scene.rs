@@ -8,12 +8,12 @@ use crate::runtime::SceneTree;
 /// Metres from the centre of the earth to its surface, with mountains and aircraft.
 const EARTH_RADIUS_M: std::ops::Range<f64> = 6.3e6..6.5e6;
 
-/// Whether any frame of a path shows the scene in an image of `size` pixels.
+/// Returns whether any frame of a path shows the scene in an image of `size` pixels.
 pub(super) fn is_ever_in_view(tree: &SceneTree, path: &CameraPath, size: [u32; 2]) -> bool {
     path.frames.iter().any(|at| tree.is_in_view(&View::new(at.pose, DVec3::ZERO, size)))
 }
 
-/// Where the scene and the camera of a frame are, and what may be wrong with the coordinates.
+/// Describes where the scene and the camera of a frame are, and what may be wrong with the coordinates.
 pub(super) fn positions(bounds: [DVec3; 2], frame: u64, eye: DVec3) -> String {
     let [min, max] = bounds;
     let point = |at: DVec3| format!("({:.2}, {:.2}, {:.2})", at.x, at.y, at.z);

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::import;
 
-/// What separates notices. Viewers divide glTF's `asset.copyright` at semicolons.
+/// Separates notices. Viewers divide glTF's `asset.copyright` at semicolons.
 const SEPARATOR: char = ';';
 
 /// The notices of all inputs in their order, then `more`, each once; `None` if there is none.

@@ -267,7 +267,7 @@ fn replay_once(arguments: &RunArgs, warns: bool) -> Result<(serde_json::Value, O
     Ok((summary, unusable(dir, &context.broken)))
 }
 
-/// What is to be said of files that a run could not use, if there are any.
+/// Describes the files that a run could not use, if there are any.
 fn unusable(dir: &Path, broken: &[String]) -> Option<Error> {
     let first = broken.first()?;
     let files = match broken.len() {

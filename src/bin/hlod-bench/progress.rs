@@ -11,7 +11,7 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, P
 /// The bar is drawn again this often, also while no frame ends.
 const TICK: Duration = Duration::from_millis(200);
 
-/// Where there is no terminal, a line is printed this often.
+/// Interval between lines of progress where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(30);
 
 /// The progress of a command; ends with it.
@@ -48,7 +48,7 @@ impl Progress {
         Self { bar, lines }
     }
 
-    /// So many more steps are done; `message` describes the last.
+    /// Counts further steps as done; `message` describes the last.
     pub fn advance(&self, steps: u64, message: impl FnOnce() -> String) {
         if !self.bar.is_hidden() || self.lines.is_some() {
             self.bar.set_message(message());

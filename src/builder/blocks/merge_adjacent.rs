@@ -88,7 +88,7 @@ fn joined(count: usize, shared: &BTreeMap<[usize; 2], usize>, most: usize) -> Ve
         links[a].set(b, vertices);
         links[b].set(a, vertices);
     }
-    // Of equals the first.
+    // The first of equals is taken.
     let mut order: BTreeSet<(usize, Reverse<usize>)> =
         links.iter().enumerate().map(|(set, links)| (links.total, Reverse(set))).collect();
     while let Some((total, Reverse(heaviest))) = order.pop_last()
@@ -115,7 +115,7 @@ fn joined(count: usize, shared: &BTreeMap<[usize; 2], usize>, most: usize) -> Ve
     (0..count as u32).map(|member| sets.root(member) as usize).collect()
 }
 
-/// What a set has in common with others.
+/// Links of a set to the sets that it shares vertices with.
 #[derive(Clone, Default)]
 struct Links {
     of: BTreeMap<usize, usize>,

@@ -358,7 +358,7 @@ impl<'a> Directed<'a> {
         let much_larger =
             reach > self.constants.much_larger * f64::from(triangle.length + 2.0 * limit);
         if corners.len() <= MOST_CORNERS && !much_larger {
-            // What is clipped exactly to the limit would seem to be beyond it half of the time.
+            // A part clipped exactly to the limit would seem to be beyond it half of the time.
             let near = f64::from(limit - self.rounding - off);
             let clipped =
                 (near > 0.0).then(|| clip(&corners, centre, reach, &triangle.frame(), near));

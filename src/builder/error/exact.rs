@@ -83,7 +83,7 @@ impl<'a> Walk<'a> {
         Exact { found: self.found, bound: bound + LAST_BITS * self.magnitude }
     }
 
-    /// What need not be divided further.
+    /// Returns the distance up to which a polygon is not divided further, metres.
     fn limit(&self) -> f64 {
         self.found * f64::from(TIGHTNESS) + NONE * self.magnitude
     }
@@ -157,7 +157,7 @@ impl<'a> Walk<'a> {
         let limit = self.limit();
         let much_larger = self.to.constants.much_larger * (near.length + 2.0 * limit);
         if polygon.len() <= MOST_CORNERS && reach <= much_larger {
-            // What is clipped exactly to the limit would seem to be beyond it half of the time.
+            // A part clipped exactly to the limit would seem to be beyond it half of the time.
             let clip_at = limit - 0.5 * NONE * self.magnitude;
             if let Some(Clipped { inside, outside }) = clip(&polygon, centre, reach, &near, clip_at)
                 && self.settles(farthest(&inside, &near)?.0)
