@@ -290,6 +290,10 @@ struct Found {
     used_texels: u64,
 }
 
+/// Regions begin and end at multiples of this many texels, which are the blocks of a JPEG: those of a leaf
+/// that are the source's own compress better. Two scans have 0.5 and 0.6 % fewer bytes.
+const REGION_MULTIPLE: i64 = 8;
+
 /// A region of which this part is used is taken to be used wholly.
 const NEARLY_ALL: f64 = 0.995;
 
@@ -347,6 +351,8 @@ impl Usage {
             let (mut start, mut end) =
                 ((low * side - 1.5).floor() as i64 + 1, (high * side + 0.5).ceil() as i64);
             if !wraps[axis] {
+                start = start.div_euclid(REGION_MULTIPLE) * REGION_MULTIPLE;
+                end = (end + REGION_MULTIPLE - 1).div_euclid(REGION_MULTIPLE) * REGION_MULTIPLE;
                 start = start.clamp(0, size[axis] as i64 - 1);
                 end = end.clamp(start + 1, size[axis] as i64);
             }

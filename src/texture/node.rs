@@ -19,6 +19,11 @@ use crate::{Error, Result};
 /// about half a pixel, so mip level 1 must be free of neighbours.
 const CELL: usize = 2;
 
+/// Texels per cell of a leaf's atlas. Leaves are seen from nearby and at low angles, where mip level 2 is
+/// drawn. Cells of 2 leave one and a half to four times as many pixels at borders of nodes that are not as
+/// in the source (`scripts/view-compare`); cells of 8 have a fifth more texels.
+const LEAF_CELL: usize = 4;
+
 /// Texels per cell of a root's atlas: nothing coarser replaces it.
 const ROOT_CELL: usize = 8;
 
@@ -154,7 +159,11 @@ impl BlockTextures<'_> {
 
     /// Texels a cell of a node's atlas.
     fn cell(&self, level: usize) -> usize {
-        if level == 0 && self.steps[level] > 1.0 { ROOT_CELL } else { CELL }
+        match self.steps[level] {
+            step if step <= 1.0 => LEAF_CELL,
+            _ if level == 0 => ROOT_CELL,
+            _ => CELL,
+        }
     }
 
     fn textured(&self, mut node: NodeBuilder, origin: [f64; 3]) -> Result<TexturedNode> {
