@@ -5,7 +5,6 @@
 mod tga;
 
 use std::borrow::Cow;
-use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,7 +17,7 @@ use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use crate::mesh::{TextureData, TextureSource};
-use crate::{Error, Result};
+use crate::{Error, Result, side_file};
 
 /// Longest side of an image, in texels.
 const LONGEST_SIDE: u32 = 32_768;
@@ -82,18 +81,14 @@ pub fn decode_texture(source: &TextureSource) -> Result<DecodedTexture> {
     let bytes = bytes_of(source)?;
     let image = decode(&bytes).map_err(|what| refusal(&file, source, what))?;
     let Some(opacity) = &source.opacity else { return Ok(image) };
-    let bytes = std::fs::read(opacity)
-        .map_err(|error| Error::input(opacity, format!("cannot be read: {error}")))?;
-    let mask = decode(&bytes).map_err(|what| Error::input(opacity, what))?;
+    let mask = decode(&bytes_of_file(opacity)?).map_err(|what| Error::input(opacity, what))?;
     Ok(with_opacity(image, &mask))
 }
 
 /// The alpha of the image in `file`, or its luminance where it has no transparency; 255 there where
 /// the image is a colour texture too, whose own alpha channel alone is opacity.
 pub(crate) fn alpha_values(file: &Path, is_own_alpha: bool) -> Result<GrayImage> {
-    let bytes = std::fs::read(file)
-        .map_err(|error| Error::input(file, format!("cannot be read: {error}")))?;
-    let image = decode(&bytes).map_err(|what| Error::input(file, what))?;
+    let image = decode(&bytes_of_file(file)?).map_err(|what| Error::input(file, what))?;
     if is_own_alpha && image.channels == 3 {
         return Ok(GrayImage::from_pixel(1, 1, image::Luma([255])));
     }
@@ -129,7 +124,7 @@ pub fn texture_size(source: &TextureSource) -> Result<(u32, u32)> {
 }
 
 fn size_of_file(path: &Path) -> Result<(u32, u32)> {
-    let opened = File::open(path)
+    let opened = side_file::open(path)
         .map_err(|error| Error::input(path, format!("cannot be opened: {error}")))?;
     size_of(BufReader::new(opened)).map_err(|what| Error::input(path, what))
 }
@@ -152,10 +147,16 @@ fn refusal(file: &Path, source: &TextureSource, what: String) -> Error {
 fn bytes_of(source: &TextureSource) -> Result<Cow<'_, [u8]>> {
     match &source.data {
         TextureData::Embedded(bytes) => Ok(Cow::Borrowed(&bytes[..])),
-        TextureData::File(path) => std::fs::read(path)
-            .map(Cow::Owned)
-            .map_err(|error| Error::input(path, format!("cannot be read: {error}"))),
+        TextureData::File(path) => bytes_of_file(path).map(Cow::Owned),
     }
+}
+
+/// The bytes of an image file. Its header is read first, so that a large file of something else is
+/// not read whole.
+fn bytes_of_file(path: &Path) -> Result<Vec<u8>> {
+    size_of_file(path)?;
+    side_file::read(path, side_file::MOST_BYTES)
+        .map_err(|error| Error::input(path, format!("cannot be read: {error}")))
 }
 
 /// Refuses what would not fit in memory.

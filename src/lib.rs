@@ -28,6 +28,7 @@ pub mod report;
 pub mod runtime;
 #[cfg(test)]
 mod scaling;
+mod side_file;
 pub mod stage_timer;
 pub mod texture;
 pub mod tileset;

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::Result;
 use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
+use crate::format::check_regular;
 use crate::report::build_report::{FileReport, InputReport};
 use crate::stage_timer::StageTimer;
 
@@ -25,7 +26,7 @@ pub fn unchanged(earlier: &InputReport, sources: &Sources) -> bool {
     let timer = StageTimer::current();
     let is_same = |file: &FileReport| {
         let path = Path::new(&file.path);
-        let size = std::fs::metadata(path).map_or(0, |facts| facts.len());
+        let size = check_regular(path).map_or(0, |metadata| metadata.len());
         size == file.bytes && sources.report(path).is_ok_and(|now| now == *file)
     };
     !earlier.files.is_empty() && earlier.files.par_iter().all(|file| timer.time(|| is_same(file)))

@@ -39,7 +39,7 @@ pub struct Earlier {
 }
 
 fn is_as_written(dir: &Path, file: &FileReport) -> bool {
-    std::fs::read(dir.join(&file.path))
+    crate::format::read_regular(&dir.join(&file.path))
         .is_ok_and(|bytes| FileReport::of(&file.path, &bytes) == *file)
 }
 

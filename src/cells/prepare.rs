@@ -140,7 +140,7 @@ fn earlier(out: &Path, session: &Session, options: &CellOptions) -> Result<Cells
         return Ok(none);
     }
     let is_whole = |face: &Face| {
-        std::fs::read(out.join(CELLS_DIR).join(&face.file))
+        crate::format::read_regular(&out.join(CELLS_DIR).join(&face.file))
             .is_ok_and(|bytes| file_crc(&bytes) == face.file_crc)
     };
     found.retain(|faces| faces.iter().all(is_whole));

@@ -54,7 +54,7 @@ pub use node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 pub(crate) use output_dir::resolve;
 pub use output_dir::{OutputDir, Unfinished, check_apart};
 pub use quantized::fits_in_steps;
-pub(crate) use regular_file::{open_regular, read_regular};
+pub(crate) use regular_file::{check_regular, open_regular, read_regular};
 pub use scene::{BlockInfo, COPYRIGHT, Children, Node, Scene, SharedTexture};
 pub use scene_check::{Element, SceneDefect};
 

@@ -1,19 +1,25 @@
 //! Opens files that must be regular ones.
 
-use std::fs::{self, File};
+use std::fs::{self, File, Metadata};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Opens a regular file. Anything else is refused before it is opened: opening a named pipe waits
-/// for whoever writes into it.
-pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
-    let kind = fs::metadata(path)?.file_type();
-    if kind.is_dir() {
+/// Checks that a path leads to a regular file, without opening it: opening a named pipe waits for
+/// whoever writes into it. The error says what is there instead.
+pub(crate) fn check_regular(path: &Path) -> io::Result<Metadata> {
+    let metadata = fs::metadata(path)?;
+    if metadata.is_dir() {
         return Err(io::Error::other("expected a file, found a folder"));
     }
-    if !kind.is_file() {
+    if !metadata.is_file() {
         return Err(io::Error::other("expected a regular file, found a pipe, socket or device"));
     }
+    Ok(metadata)
+}
+
+/// Opens a regular file. Anything else is refused before it is opened.
+pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
+    check_regular(path)?;
     File::open(path)
 }
 

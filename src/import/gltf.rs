@@ -38,8 +38,9 @@ const SAME_ROUNDED_NORMAL: f64 = 0.999_78;
 
 /// Reads the glTF or GLB at `path`.
 pub(super) fn load(path: &Path) -> Result<Model> {
-    super::open(path)?;
-    let bytes = std::fs::read(path)
+    let mut bytes = Vec::new();
+    super::open(path)?
+        .read_to_end(&mut bytes)
         .map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
     read(path, &bytes).map_err(|what| Error::input(path, what)).and_then(super::assemble)
 }

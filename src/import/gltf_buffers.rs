@@ -16,6 +16,7 @@ use rustc_hash::FxHashMap;
 
 use super::gltf_meshopt::{Compressed, Compression};
 use super::paths::Finder;
+use crate::side_file;
 use crate::stage_timer::StageTimer;
 
 /// A `.glb` taken apart: its JSON and its binary chunk.
@@ -65,20 +66,22 @@ pub(super) fn read_uri(
     if let Some(data) = uri.strip_prefix("data:") {
         return Ok((data_uri(data)?, None));
     }
-    let file = find_uri(uri, finder).ok_or_else(|| format!("{uri} not found"))?;
-    match std::fs::read(&file) {
+    let file = find_uri(uri, finder)?;
+    match side_file::read(&file, side_file::MOST_BYTES) {
         Ok(bytes) => Ok((bytes, Some(file))),
         Err(error) => Err(format!("{} cannot be read: {error}", file.display())),
     }
 }
 
-/// The file that a relative URI means, its percent signs decoded or, failing that, as written.
-pub(super) fn find_uri(uri: &str, finder: &mut Finder) -> Option<PathBuf> {
+/// The file that a relative URI means, its percent signs decoded or, failing that, as written. The
+/// error says why there is none.
+pub(super) fn find_uri(uri: &str, finder: &mut Finder) -> Result<PathBuf, String> {
     let decoded = percent_decoded(uri.as_bytes());
     std::str::from_utf8(&decoded)
         .ok()
         .and_then(|name| finder.find(name))
         .or_else(|| finder.find(uri))
+        .ok_or_else(|| format!("{uri} {}", finder.why_missing(&decoded)))
 }
 
 /// What follows `data:`, decoded.

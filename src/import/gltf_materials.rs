@@ -191,8 +191,7 @@ impl<'a> Materials<'a> {
             (Some(view), _) => buffers.view(view)?.to_vec(),
             (None, Some(uri)) if uri.starts_with("data:") => read_uri(uri, finder)?.0,
             (None, Some(uri)) => {
-                let file =
-                    find_uri(uri, finder).ok_or_else(|| format!("texture {uri} not found"))?;
+                let file = find_uri(uri, finder).map_err(|what| format!("texture {what}"))?;
                 return Ok(self.textures.file(uri, file, None));
             }
             (None, None) => return Err("image without data".to_owned()),

@@ -42,6 +42,7 @@ pub use find::find_inputs;
 use glam::DVec3;
 
 use self::plain_text::PlainText;
+use crate::format::open_regular;
 use crate::mesh::{Material, Model, Part, Warnings};
 use crate::{Error, Result};
 
@@ -56,6 +57,11 @@ pub fn load(path: &Path) -> Result<Model> {
     }
 }
 
+/// True if a file is a model by its extension.
+pub(crate) fn is_model(path: &Path) -> bool {
+    find::kind(path).is_some()
+}
+
 /// The copyright notice that a model file states (`asset.copyright` of glTF). Reads its JSON alone.
 pub fn copyright(path: &Path) -> Option<String> {
     match find::kind(path)? {
@@ -66,14 +72,7 @@ pub fn copyright(path: &Path) -> Option<String> {
 
 /// Opens a model file.
 fn open(path: &Path) -> Result<File> {
-    let file = File::open(path)
-        .map_err(|error| Error::input(path, format!("cannot be opened: {error}")))?;
-    match file.metadata() {
-        Ok(metadata) if metadata.is_dir() => {
-            Err(Error::input(path, "is a folder; expected a model file"))
-        }
-        _ => Ok(file),
-    }
+    open_regular(path).map_err(|error| Error::input(path, format!("cannot be opened: {error}")))
 }
 
 /// Opens an OBJ.

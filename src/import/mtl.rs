@@ -354,7 +354,7 @@ impl Entry {
             let statement = TextureStatement::of_tile(map.as_deref()?, tile, finder);
             let shown = names::display(&unescaped(&statement.name), self.encoding(finder));
             if statement.file.is_none() {
-                warn(format!("texture {shown} not found"));
+                warn(format!("texture {shown} {}", finder.why_missing(&statement.name)));
             }
             Some((shown, statement))
         };

@@ -44,7 +44,7 @@ use super::vertices::{NONE, Numbered, Unifier};
 use super::words::Words;
 use crate::mesh::{Group, Model, Normal, Part, SAME_NORMAL, Warnings};
 use crate::stage_timer::StageTimer;
-use crate::{Error, Result};
+use crate::{Error, Result, side_file};
 
 /// Text that one thread parses at a time: it and what is made of it should stay in the cache.
 pub(super) const CHUNK_BYTES: usize = 1 << 18;
@@ -561,15 +561,15 @@ impl<'a> Obj<'a> {
             if self.libraries.contains(&file) {
                 continue;
             }
-            match std::fs::read(&file) {
+            self.dependencies.push(file.clone());
+            match side_file::read(&file, side_file::MOST_LIBRARY_BYTES) {
                 Ok(bytes) => {
                     self.library.add(&bytes, self.library_encoding);
-                    self.dependencies.push(file.clone());
                     self.libraries.insert(file);
                 }
                 Err(error) => self.warn_of_library(
                     file.as_os_str().as_encoded_bytes(),
-                    &format!("cannot be read ({error})"),
+                    &format!("cannot be read: {error}"),
                 ),
             }
         }
@@ -592,7 +592,8 @@ impl<'a> Obj<'a> {
         let Some(missing) = missing else { return };
         let name = words.run(missing);
         self.finder.find(name);
-        self.warn_of_library(name, "not found");
+        let why = self.finder.why_missing(name);
+        self.warn_of_library(name, &why);
     }
 
     fn warn_of_library(&mut self, name: &[u8], problem: &str) {

@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
+use std::io;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use encoding_rs::Encoding;
 
 use super::names::{folded, forms, unescaped};
+use crate::side_file;
 
 /// Folders beside the model in which exporters put textures.
 const USUAL_FOLDERS: [&str; 5] = ["textures", "texture", "tex", "images", "maps"];
@@ -46,13 +48,36 @@ impl Finder {
     pub(super) fn find(&mut self, name: impl AsRef<[u8]>) -> Option<PathBuf> {
         let name = name.as_ref();
         let found = self.existing(name);
-        if found.is_none() && is_possible(name) {
-            let slashed = with_slashes(&unescaped(name));
-            let base_name = components(&slashed).last().map(|name| name.to_vec());
-            let places = [Some(slashed.clone()), base_name].into_iter().flatten();
-            self.absent.extend(places.map(|place| self.folder.join(OsStr::from_bytes(&place))));
+        if found.is_none() {
+            let candidates = self.first_candidates(name);
+            self.absent.extend(candidates);
         }
         found
+    }
+
+    /// The paths at which a file is looked for first.
+    fn first_candidates(&self, name: &[u8]) -> Vec<PathBuf> {
+        if !is_possible(name) {
+            return Vec::new();
+        }
+        let slashed = with_slashes(&unescaped(name));
+        let base_name = components(&slashed).last().map(|name| name.to_vec());
+        let names = [Some(slashed.clone()), base_name].into_iter().flatten();
+        names.map(|name| self.folder.join(OsStr::from_bytes(&name))).collect()
+    }
+
+    /// Says of a name for which there is no file that it was not found, or what is there instead.
+    pub(super) fn why_missing(&self, name: &[u8]) -> String {
+        let is_absence = |error: &io::Error| {
+            use io::ErrorKind::{InvalidFilename, NotADirectory, NotFound};
+            matches!(error.kind(), NotFound | NotADirectory | InvalidFilename)
+        };
+        let faults = self.first_candidates(name).into_iter();
+        let mut faults = faults.filter_map(|path| side_file::check(&path).err());
+        match faults.find(|error| !is_absence(error)) {
+            Some(error) => format!("cannot be read: {error}"),
+            None => "not found".to_owned(),
+        }
     }
 
     /// The file that `name` means, where there is one. Tries the name in each of its [`forms`]: as
@@ -83,7 +108,7 @@ impl Finder {
     /// The file at `name` as it is written, relative to the model's folder.
     pub(super) fn as_written(&self, name: &[u8]) -> Option<PathBuf> {
         let file = self.folder.join(OsStr::from_bytes(name));
-        (is_possible(name) && file.is_file()).then_some(file)
+        (is_possible(name) && side_file::check(&file).is_ok()).then_some(file)
     }
 
     fn exactly(&self, name: &[u8], components: &[&[u8]]) -> Option<PathBuf> {
@@ -153,11 +178,10 @@ impl Listing {
         let mut listing = Self::default();
         for name in names {
             let path = folder.join(&name);
-            let Ok(metadata) = path.metadata() else { continue };
-            let entries = match metadata.is_dir() {
-                true => &mut listing.folders,
-                false if metadata.is_file() => &mut listing.files,
-                false => continue,
+            let entries = match side_file::check(&path) {
+                Ok(()) => &mut listing.files,
+                Err(_) if path.is_dir() => &mut listing.folders,
+                Err(_) => continue,
             };
             entries.entry(folded(name.as_bytes())).or_insert(path);
         }

@@ -7,9 +7,11 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::builder::Subset;
+use crate::format::check_regular;
+use crate::import::is_model;
 use crate::mesh::{Kept, UpAxis, Warnings};
 use crate::texture::BakeReason;
-use crate::{Error, Result};
+use crate::{Error, Result, side_file};
 
 /// The contents of `build.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -175,16 +177,22 @@ pub enum UpFrom {
 }
 
 impl FileReport {
-    /// Of a file on disk. One that is not there has no bytes: should it appear, that is a change.
+    /// Of a file on disk. What is no regular file, or may not be opened, has no bytes: should a file
+    /// appear there, that is a change. A texture or library that is too large to be read is known by
+    /// its size alone.
     pub fn read(path: &Path) -> Result<Self> {
         let failed = |error: std::io::Error| Error::input(path, format!("cannot be read: {error}"));
         let name = path.to_string_lossy().into_owned();
-        let file = match File::open(path) {
-            Err(error)
-                if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) =>
-            {
-                return Ok(Self { path: name, ..Self::default() });
+        let unread = |bytes| Ok(Self { path: name.clone(), bytes, ..Self::default() });
+        match check_regular(path) {
+            Err(_) => return unread(0),
+            Ok(metadata) if metadata.len() > side_file::MOST_BYTES && !is_model(path) => {
+                return unread(metadata.len());
             }
+            Ok(_) => {}
+        }
+        let file = match File::open(path) {
+            Err(error) if error.kind() == ErrorKind::PermissionDenied => return unread(0),
             opened => opened.map_err(failed)?,
         };
         let mut hasher = blake3::Hasher::new();

@@ -111,7 +111,7 @@ impl Walk {
             self.fault(file, "is referred to twice, expected a tree");
             return None;
         }
-        let parsed = std::fs::read(out.join(file))
+        let parsed = crate::format::read_regular(&out.join(file))
             .map_err(|error| format!("cannot be read: {error}"))
             .and_then(|bytes| {
                 serde_json::from_slice::<Value>(&bytes).map_err(|error| format!("JSON: {error}"))

@@ -121,7 +121,7 @@ fn judge(seen: &[SeenFaces], limits: &Limits, check: &mut Check) {
 /// What is wrong with a face.
 fn face_failure(out: &Path, cells: &Cells, cell: &Cell, face: &Face) -> Option<String> {
     let path = out.join(CELLS_DIR).join(&face.file);
-    let bytes = match std::fs::read(&path) {
+    let bytes = match crate::format::read_regular(&path) {
         Ok(bytes) => bytes,
         Err(error) => return Some(format!("cannot be read: {error}")),
     };

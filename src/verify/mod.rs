@@ -108,7 +108,7 @@ pub fn verify(
         cells: Vec::new(),
     };
     let path = out.join(SCENE_FILE);
-    let bytes = std::fs::read(&path)
+    let bytes = crate::format::read_regular(&path)
         .map_err(|error| Error::input(&path, format!("cannot read the scene: {error}")))?;
     match Scene::from_bytes(&bytes, &path) {
         Ok(scene) => {

@@ -5,7 +5,9 @@ use std::sync::OnceLock;
 
 use super::surface_appearance::{Color, SurfaceAppearance};
 use crate::decode::{DecodedTexture, decode_texture};
-use crate::format::{NODES_DIR, NodeImageData, NodeMesh, Scene, TEXTURES_DIR, read_glb};
+use crate::format::{
+    NODES_DIR, NodeImageData, NodeMesh, Scene, TEXTURES_DIR, read_glb, read_regular,
+};
 use crate::mesh::{TextureData, TextureSource};
 
 /// Decodes images of nodes. Those that nodes share are decoded once and kept; a node's own only
@@ -30,7 +32,7 @@ impl<'a> NodeTextures<'a> {
     pub fn colors(&self, node: u32, points: &[NodePoint]) -> Vec<Option<Color>> {
         let nothing = || vec![None; points.len()];
         let file = &self.scene.nodes[node as usize].file;
-        let Ok(bytes) = std::fs::read(self.out.join(NODES_DIR).join(file)) else {
+        let Ok(bytes) = read_regular(&self.out.join(NODES_DIR).join(file)) else {
             return nothing();
         };
         let Ok(mesh) = read_glb(&bytes, Path::new(file)) else { return nothing() };

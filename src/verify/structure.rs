@@ -49,7 +49,7 @@ pub(super) fn structure(
     check.extend(scene.shared_textures.iter().filter_map(|texture| {
         let path = out.join(TEXTURES_DIR).join(&texture.file_name);
         let place = format!("{TEXTURES_DIR}/{}", texture.file_name);
-        let what = match std::fs::read(&path) {
+        let what = match crate::format::read_regular(&path) {
             Err(error) => format!("cannot be read: {error}"),
             Ok(bytes) if bytes.len() as u64 != texture.bytes => {
                 format!("expected {} bytes, found {}", texture.bytes, bytes.len())
@@ -109,7 +109,7 @@ fn read_node(
 ) -> (NodeGeometry, Vec<Failure>) {
     let failure = |what, hint| Failure { place: node.file.clone(), what, hint };
     let path = out.join(NODES_DIR).join(&node.file);
-    let bytes = match std::fs::read(&path) {
+    let bytes = match crate::format::read_regular(&path) {
         Ok(bytes) => bytes,
         Err(error) => {
             let what = format!("cannot be read: {error}");

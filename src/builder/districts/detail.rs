@@ -34,7 +34,7 @@ impl<'a> FileDetail<'a> {
     /// Reads the file of the root of a tree.
     pub fn read(files: &'a Files<'a>, tree: &'a Tree<NodeRecord>) -> Result<Self> {
         let path = files.out.join(NODES_DIR).join(&tree.record.file);
-        let bytes = std::fs::read(&path)
+        let bytes = crate::format::read_regular(&path)
             .map_err(|error| Error::output(&path, format!("cannot be read again: {error}")))?;
         let mesh = surface(&read_glb_without_normals(&bytes, &path)?, files.origin);
         Ok(Self { files, tree, surface: Arc::new(Original::of(&mesh, files.constants)) })

@@ -79,7 +79,7 @@ pub fn read_pictures<'a>(
 
 fn read_node(out: &Path, record: &NodeRecord) -> Result<NodeMesh> {
     let path = out.join(NODES_DIR).join(&record.file);
-    let bytes = std::fs::read(&path)
+    let bytes = crate::format::read_regular(&path)
         .map_err(|error| Error::output(&path, format!("cannot be read again: {error}")))?;
     read_glb(&bytes, &path)
 }

@@ -53,7 +53,7 @@ pub(super) fn read(
 ) -> Result<()> {
     for &index in nodes {
         let path = dir.join(NODES_DIR).join(&scene.nodes[index as usize].file);
-        let bytes = std::fs::read(&path)
+        let bytes = crate::format::read_regular(&path)
             .map_err(|error| Error::input(&path, format!("cannot read the node: {error}")))?;
         let mesh = read_glb_without_normals(&bytes, &path)?;
         let origin = DVec3::from_array(mesh.origin);

@@ -849,3 +849,21 @@ fn normals_that_cannot_be_are_dropped_and_counted() {
     let (flat, model) = tilted([[0.0, 0.0, 2.0]; 4], &[json!({"scale": [2, 3, 4]})]).unwrap();
     assert_eq!((flat, model.warnings.is_empty()), (vec![None], true));
 }
+
+#[test]
+fn buffers_that_are_no_files_are_refused_and_images_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("city.glb");
+    for (name, what) in crate::side_file::make_faulty_files(folder.path()) {
+        let (mut json, binary) = textured();
+        json["images"] = json!([{"uri": name}]);
+        let model = read(&path, &glb(&json, &binary)).unwrap();
+        assert_eq!(model.materials[0].texture, None);
+        let (warning, times) = model.warnings.iter().next().unwrap();
+        assert!(warning.contains(&format!("texture {name} cannot be read: ")), "{warning}");
+        assert!(warning.contains(what) && times == 1, "{warning}");
+        json["buffers"][0]["uri"] = name.into();
+        let refusal = read(&path, &glb(&json, &binary)).unwrap_err();
+        assert!(refusal.contains("buffer 0: ") && refusal.contains(what), "{refusal}");
+    }
+}

@@ -865,3 +865,52 @@ fn mutated_libraries_give_a_model() {
         assert!(read_from(&folder, SAMPLE).is_ok());
     }
 }
+
+#[test]
+fn libraries_and_textures_that_are_no_files_are_warned_of_like_missing_ones() {
+    let folder = folder_with(&[("a.mtl", ""), ("large.mtl", "")]);
+    let large = fs::File::options().write(true).open(folder.path().join("large.mtl")).unwrap();
+    large.set_len(crate::side_file::MOST_LIBRARY_BYTES + 1).unwrap();
+    let faulty = crate::side_file::make_faulty_files(folder.path());
+    for (name, what) in faulty {
+        let mtl = format!("newmtl m\nKd 0 1 0\nmap_Kd {name}\nmap_d {name}\n");
+        fs::write(folder.path().join("a.mtl"), mtl).unwrap();
+        let obj = format!("mtllib {name}\nmtllib a.mtl\n{SQUARE}usemtl m\nf 1 2 3 4\n");
+        let model = read_from(&folder, obj).unwrap();
+        let found = warnings(&model);
+        assert_eq!(found.iter().map(|(_, times)| *times).collect::<Vec<_>>(), [1, 2], "{found:?}");
+        let library = format!("material library {name} cannot be read: ");
+        let texture = format!("material m: texture {name} cannot be read: ");
+        for ((found, _), expected) in found.iter().zip([library, texture]) {
+            assert!(found.starts_with(&expected) && found.contains(what), "{found}");
+        }
+        assert_eq!(model.materials[0].base_color, [0.0, 1.0, 0.0, 1.0]);
+        // None of them ends or delays the report on files.
+        for path in &model.dependencies {
+            let report = crate::report::build_report::FileReport::read(path).unwrap();
+            let is_read = ["a.mtl", "city.obj"].iter().any(|name| path.ends_with(name));
+            assert_eq!(!report.blake3.is_empty(), is_read && path.exists(), "{report:?}");
+        }
+    }
+    let model = read_from(&folder, format!("mtllib large.mtl\n{SQUARE}f 1 2 3 4\n")).unwrap();
+    assert!(warnings(&model)[0].0.contains("expected at most 256 MiB"), "{:?}", warnings(&model));
+}
+
+#[test]
+fn a_model_that_is_no_file_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let faulty = crate::side_file::make_faulty_files(folder.path());
+    for (name, what) in faulty.into_iter().filter(|(name, _)| *name != "sparse") {
+        for extension in ["obj", "gltf"] {
+            let path = folder.path().join(format!("{name}.{extension}"));
+            std::os::unix::fs::symlink(name, &path).unwrap();
+            let refusals =
+                [crate::import::load(&path).map(drop), crate::import::bounds(&path).map(drop)];
+            for refusal in refusals {
+                let error = refusal.unwrap_err();
+                assert_eq!(error.exit_code(), 3);
+                assert!(error.to_string().contains(what), "{error}");
+            }
+        }
+    }
+}

@@ -14,6 +14,7 @@ use gltf::{Gltf, Semantic};
 use super::content::{Content, Polygons, area};
 use super::texture::{Image, Sample, Samples};
 use crate::mesh::Wrap;
+use crate::side_file;
 
 /// Extensions that change neither shape nor base colour, or whose colours are left alone.
 const UNDERSTOOD: [&str; 2] = ["KHR_texture_transform", "KHR_lights_punctual"];
@@ -101,7 +102,8 @@ fn bytes_of(uri: &str, folder: &Path) -> Result<Vec<u8>, String> {
     if uri.contains(['%', ':']) {
         return Err(format!("{uri} is no plain file name"));
     }
-    std::fs::read(folder.join(uri)).map_err(|error| format!("{uri}: {error}"))
+    side_file::read(&folder.join(uri), side_file::MOST_BYTES)
+        .map_err(|error| format!("{uri}: {error}"))
 }
 
 impl Reader<'_> {

@@ -9,6 +9,7 @@ use super::content::{Content, Polygons, area};
 use super::texture::{Image, Sample, Samples};
 use crate::color::srgb_to_linear;
 use crate::mesh::Wrap;
+use crate::side_file;
 
 /// What the importer calls the material of faces that have none.
 const NO_MATERIAL: &str = "default";
@@ -79,7 +80,8 @@ impl Reader {
 
     /// Takes a file of materials in, where it is found under this very name.
     fn library(&mut self, name: &str) {
-        let Ok(bytes) = std::fs::read(self.folder.join(name.replace('\\', "/"))) else { return };
+        let path = self.folder.join(name.replace('\\', "/"));
+        let Ok(bytes) = side_file::read(&path, side_file::MOST_LIBRARY_BYTES) else { return };
         let mut current = None;
         for line in lines(&bytes) {
             let line = String::from_utf8_lossy(&line);
@@ -102,7 +104,7 @@ impl Reader {
                 }
                 "map_kd" => {
                     let path = self.folder.join(rest.replace('\\', "/"));
-                    look.is_doubtful |= !path.is_file();
+                    look.is_doubtful |= side_file::check(&path).is_err();
                     look.texture = Some(path);
                 }
                 _ => {}
