@@ -1,10 +1,12 @@
 //! MTL: material libraries of OBJ.
 //!
-//! Of its statements `Kd`, `d`, `Tr`, `map_Kd` and `map_d` matter here; one that cannot be read
-//! costs no other. The alpha channel of a `map_Kd` counts where `map_d` names the same file or `d`
+//! Of its statements `Kd`, `d`, `Tr`, `map_Kd` and `map_d` (or `map_opacity`, as OpenSceneGraph calls
+//! it) matter here; one that cannot be read costs no other. The first definition of a name counts, in
+//! one library and in several: of several libraries the format has the first searched first, and
+//! tinyobjloader does the same within each; Blender and assimp take the last. The alpha channel of a `map_Kd` counts where `map_d` names the same file or `d`
 //! is below 1, as in three.js; Blender and obj2gltf ignore it without a `map_d` too.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use encoding_rs::Encoding;
@@ -22,6 +24,9 @@ use crate::mesh::{AlphaMode, Material, Warnings, Wrap};
 
 /// Alpha below this is a hole where a material has a `map_d` of two values.
 const CUTOFF: f32 = 0.5;
+
+/// Components of `Kd` may be so far outside 0 to 1: half a step of 8 bits.
+const COLOR_ROUNDING: f64 = 1.0 / 510.0;
 
 /// A material and what becomes of the texture coordinates that its faces give.
 #[derive(Clone, Debug)]
@@ -133,7 +138,7 @@ impl MtlMaterial {
 #[derive(Default)]
 pub(super) struct Library {
     materials: Vec<Entry>,
-    /// By name; the last definition of a name counts.
+    /// By name, the first definition.
     by_name: BTreeMap<Vec<u8>, usize>,
     /// By [`comparable`] name.
     by_comparable: BTreeMap<Vec<u8>, usize>,
@@ -150,10 +155,12 @@ struct Entry {
 }
 
 /// The statements of a material, each the last of its kind.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 struct Statements {
     /// `Kd`, sRGB.
     diffuse: Option<[f64; 3]>,
+    /// Statements whose values cannot be read or that have a meaning which import does not know.
+    unread: BTreeSet<Vec<u8>>,
     /// `d`.
     dissolve: Option<f64>,
     /// `d -halo`.
@@ -172,13 +179,10 @@ impl Statements {
     fn add(&mut self, keyword: &[u8], mut rest: &[u8]) {
         let map = (!rest.is_empty()).then(|| rest.to_vec());
         match keyword {
-            b"kd" => {
-                if let (Some(r), Some(g), Some(b)) =
-                    (number(&mut rest), number(&mut rest), number(&mut rest))
-                {
-                    self.diffuse = Some([r, g, b]);
-                }
-            }
+            b"kd" => match color(rest) {
+                Some(color) => self.diffuse = Some(color),
+                None => _ = self.unread.insert([b"Kd ", rest].concat()),
+            },
             b"d" => {
                 let mut values = rest;
                 let has_halo = word(&mut values).is_some_and(|word| word == b"-halo");
@@ -189,9 +193,24 @@ impl Statements {
             }
             b"tr" => self.transparency = number(&mut rest).or(self.transparency),
             b"map_kd" => self.diffuse_map = map.or_else(|| self.diffuse_map.take()),
-            b"map_d" => self.opacity_map = map.or_else(|| self.opacity_map.take()),
+            b"map_d" | b"map_opacity" => self.opacity_map = map.or_else(|| self.opacity_map.take()),
+            // Exporters do not agree on whether white is opaque in it.
+            b"map_tr" => _ = self.unread.insert([b"map_Tr ", rest].concat()),
             _ => {}
         }
+    }
+}
+
+/// The values of `Kd`: red, green and blue, or one value for all three. `None` for what is neither,
+/// as the forms `xyz` and `spectral`.
+fn color(rest: &[u8]) -> Option<[f64; 3]> {
+    let words = rest.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let words = words.take_while(|word| word[0] != b'#').take(3);
+    let values: Option<Vec<f64>> = words.map(|mut word| number(&mut word)).collect();
+    match values?[..] {
+        [grey] => Some([grey; 3]),
+        [r, g, b] => Some([r, g, b]),
+        _ => None,
     }
 }
 
@@ -240,12 +259,31 @@ impl Library {
         let number = self.materials.len();
         let statements = Statements::default();
         self.materials.push(Entry { name: name.to_vec(), encoding, statements });
-        self.by_name.insert(name.to_vec(), number);
-        self.by_comparable.insert(comparable(name), number);
+        self.by_name.entry(name.to_vec()).or_insert(number);
+        self.by_comparable.entry(comparable(name)).or_insert(number);
         let bare = without_comment(name);
         if bare.len() < name.len() {
-            self.by_bare.insert(comparable(bare), number);
+            self.by_bare.entry(comparable(bare)).or_insert(number);
         }
+    }
+
+    /// The names of `used` whose materials are defined again with other statements, each once.
+    pub(super) fn redefined<'a>(&self, used: impl Iterator<Item = &'a [u8]>) -> Vec<&'a [u8]> {
+        let is_other = |entry: &&Entry| {
+            let first = &self.materials[self.by_name[&entry.name]];
+            first.statements != entry.statements
+        };
+        let others: BTreeSet<&[u8]> =
+            self.materials.iter().filter(is_other).map(|entry| &entry.name[..]).collect();
+        if others.is_empty() {
+            return Vec::new();
+        }
+        let mut known = BTreeSet::new();
+        used.filter(|name| {
+            let defined = self.meant(name).map(|entry| &entry.name[..]);
+            defined.is_some_and(|defined| others.contains(defined) && known.insert(defined))
+        })
+        .collect()
     }
 
     /// The material that a name means: the one of that very name; else one whose name differs in
@@ -356,6 +394,9 @@ impl Entry {
             if statement.file.is_none() {
                 warn(format!("texture {shown} {}", finder.why_missing(&statement.name)));
             }
+            if let Some(what) = statement.problem {
+                warn(format!("texture {shown}: {what}"));
+            }
             Some((shown, statement))
         };
         let color_map = read(&source.diffuse_map);
@@ -413,6 +454,10 @@ impl Entry {
             None if textured || source.diffuse_map.is_some() => set_color(material, [1.0; 3]),
             None => {}
         }
+        for statement in &source.unread {
+            let statement = names::display(statement, self.encoding(finder));
+            warn(format!("\"{}\" is not read", statement.trim_end()));
+        }
         result.has_color = source.diffuse.is_some() || source.diffuse_map.is_some();
         if source.has_halo {
             warn("d -halo taken as d".into());
@@ -429,8 +474,18 @@ impl Entry {
             }
             _ => {}
         }
+        if source.diffuse.is_some_and(is_out_of_range) {
+            let what = "material with Kd outside 0 to 1, clamped; divide values of 0 to 255 by 255";
+            warnings.add(format!("{}: {what}", model.display()), 1);
+        }
         result
     }
+}
+
+/// True for a finite colour with a component outside 0 to 1 by more than rounding.
+fn is_out_of_range(color: [f64; 3]) -> bool {
+    let is_outside = |part: &f64| !(-COLOR_ROUNDING..=1.0 + COLOR_ROUNDING).contains(part);
+    color.iter().all(|part| part.is_finite()) && color.iter().any(is_outside)
 }
 
 fn set_color(material: &mut Material, color: [f64; 3]) {
@@ -603,5 +658,66 @@ mod tests {
         let mtl = "Kd 1\nnewmtl\nnewmtl a\nKd 0.5\nKd red\nd\nmap_Kd\nKd 1 0 0\nnewmtl b\nKd 0 0 1";
         assert_eq!(read(mtl, "a", &[]).0.material.base_color, [1.0, 0.0, 0.0, 1.0]);
         assert_eq!(read(mtl, "b", &[]).0.material.base_color, [0.0, 0.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn one_value_of_kd_is_grey_and_other_forms_are_named() {
+        for (statement, color) in
+            [("Kd 0.5", [0.5; 3]), ("Kd 0.5 # 1 1", [0.5; 3]), ("Kd 0 1 0.5 1", [0.0, 1.0, 0.5])]
+        {
+            let (material, _, warnings) = read(format!("newmtl a\n{statement}\n"), "a", &[]);
+            let expected = color.map(|part| srgb_to_linear(part) as f32);
+            assert_eq!(material.material.base_color[..3], expected, "{statement}");
+            assert!(warnings.is_empty(), "{warnings:?}");
+        }
+        let plain = Material::plain("a").base_color;
+        for statement in
+            ["Kd spectral a.rfl 1", "Kd xyz 0.1 0.2 0.3", "Kd 0.5 1", "Kd", "map_Tr t.png"]
+        {
+            let (material, _, warnings) = read(format!("newmtl a\n{statement}\n"), "a", &["t.png"]);
+            assert_eq!(material.material.base_color, plain, "{statement}");
+            let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+            assert!(
+                warning.ends_with(&format!("material a: \"{statement}\" is not read")),
+                "{warning}"
+            );
+        }
+    }
+
+    #[test]
+    fn colours_outside_0_to_1_are_warned_of() {
+        for (values, is_warned) in [
+            ("255 128 0", true),
+            ("0.5 -0.1 0", true),
+            ("1.001 0 -0.0001", false),
+            ("0 nan 9", false),
+        ] {
+            let (.., warnings) = read(format!("newmtl a\nKd {values}\n"), "a", &[]);
+            let found = warnings.iter().any(|warning| warning.contains("Kd outside 0 to 1"));
+            assert_eq!(found, is_warned, "{values}: {warnings:?}");
+        }
+    }
+
+    #[test]
+    fn map_opacity_is_map_d() {
+        let mtl = "newmtl a\nmap_Kd wall.png\nmap_opacity hole.png\n";
+        let (material, textures, warnings) = read(mtl, "a", &["wall.png", "hole.png"]);
+        assert_eq!(material.material.alpha, CUT_OUT);
+        assert!(textures.list[0].opacity.is_some() && warnings.is_empty(), "{warnings:?}");
+    }
+
+    #[test]
+    fn scales_that_hide_a_texture_are_warned_of() {
+        for (options, scale, warning) in [
+            ("-s 0 0 0", [0.0, 0.0], "-s of 0"),
+            ("-s 2 0 1", [2.0, 0.0], "-s of 0"),
+            ("-s 1e30 2", [1.0, 1.0], "both ignored"),
+            ("-s 2 2 -o 0 -1e30", [1.0, 1.0], "both ignored"),
+        ] {
+            let mtl = format!("newmtl a\nmap_Kd {options} wall.png\n");
+            let (material, _, warnings) = read(mtl, "a", &["wall.png"]);
+            assert_eq!(material.transform.scale, scale, "{options}");
+            assert!(warnings[0].contains(warning), "{options}: {warnings:?}");
+        }
     }
 }

@@ -656,12 +656,25 @@ impl<'a> Obj<'a> {
                 self.parts.iter_mut().filter(of_material).for_each(|state| state.bare_faces = 0);
             }
         }
+        self.warn_of_redefinitions();
         if has_colors {
             for used in self.materials.iter_mut().filter(|used| !used.material.has_color) {
                 let [color @ .., _] = &mut used.material.material.base_color;
                 *color = [1.0; 3];
             }
         }
+    }
+
+    /// Warns where libraries define a material that is used again, and otherwise.
+    fn warn_of_redefinitions(&mut self) {
+        let names = self.library.redefined(self.materials.iter().map(|used| &used.name[..]));
+        let Some(first) = names.first() else { return };
+        let what = format!(
+            "{}: material defined again with other statements, the first definition counts (first: {})",
+            self.path.display(),
+            names::display(first, self.encoding())
+        );
+        self.warnings.add(what, names.len() as u64);
     }
 
     /// Makes linear light of all colours.

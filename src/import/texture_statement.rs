@@ -44,7 +44,13 @@ pub(super) struct TextureStatement {
     pub(super) file: Option<PathBuf>,
     pub(super) transform: UvTransform,
     pub(super) is_clamped: bool,
+    /// What is wrong with the values of `-s` or `-o`.
+    pub(super) problem: Option<&'static str>,
 }
+
+/// A texture may repeat so often from one texture coordinate to the next whole one, and be moved by
+/// so many repeats. f32 keeps 2^-8 of a repeat there.
+const MOST_REPEATS: f64 = 65536.0;
 
 impl TextureStatement {
     /// Takes a statement apart, with the file of a UDIM tile where its name has one for each.
@@ -59,12 +65,30 @@ impl TextureStatement {
 
     /// Takes a statement apart. Where its name is of UDIM tiles, the file is that of one of them.
     pub(super) fn parse(statement: &[u8], finder: &mut Finder) -> Self {
+        let mut parsed = Self::taken_apart(statement, finder);
+        parsed.check_transform();
+        parsed
+    }
+
+    /// Ignores a transform beyond what can be sampled, and notes what hides the texture.
+    fn check_transform(&mut self) {
+        let UvTransform { scale, offset } = self.transform;
+        if scale.iter().chain(&offset).any(|value| value.abs() > MOST_REPEATS) {
+            self.transform = UvTransform::default();
+            self.problem = Some("-s or -o of more than 65536, both ignored");
+        } else if scale.contains(&0.0) {
+            self.problem = Some("-s of 0, one row or column of it is shown");
+        }
+    }
+
+    fn taken_apart(statement: &[u8], finder: &mut Finder) -> Self {
         let statement = statement.trim_ascii();
         let mut parsed = Self {
             name: statement.to_vec(),
             file: finder.as_written(statement),
             transform: UvTransform::default(),
             is_clamped: false,
+            problem: None,
         };
         if parsed.file.is_some() {
             return parsed;
@@ -86,6 +110,9 @@ impl TextureStatement {
                 parsed.file = Some(file);
                 at = end;
                 continue;
+            }
+            if at > 0 && words.run(at..at + 1).starts_with(b"#") {
+                break;
             }
             // An option that is not defined is a name only where there is nothing else.
             if unknown.is_none_or(|first| is_dashed(&words, first)) {
@@ -222,6 +249,8 @@ mod tests {
         assert_eq!(parse("-x.png", &[]), plain("-x.png"));
         assert_eq!(parse("-s", &[]), plain("-s"));
         assert_eq!(parse("a.png # brick", &[]), plain("a.png"));
+        assert_eq!(parse("a.png # -s 2 3 1", &[]), plain("a.png"));
+        assert_eq!(parse("a.png # was b.png", &["b.png"]), plain("a.png"));
         assert_eq!(
             parse("-CLAMP On -s 2 3 1 -o 0.5 -0.25 b c.png", &[]),
             ("b c.png".into(), [2.0, 3.0], [0.5, -0.25], true, None)
@@ -245,6 +274,10 @@ mod tests {
             ("\"my t.png\" -s 2 3 1", &["my t.png"], "my t.png", [2.0, 3.0]),
             ("my\\ t.png -s 2 3 1", &["my t.png"], "my t.png", [2.0, 3.0]),
             ("t.png # 2", &["t.png # 2", "t.png"], "t.png # 2", [1.0; 2]),
+            ("t.png # -s 2 3 1", &["t.png"], "t.png", [1.0; 2]),
+            ("t.png #-s 2 3", &["t.png"], "t.png", [1.0; 2]),
+            ("-s 2 3 #t.png # -s 4 5", &["#t.png"], "#t.png", [2.0, 3.0]),
+            ("-s 2 3 t.png # was u.png", &["t.png", "u.png"], "t.png", [2.0, 3.0]),
             ("a -t 1.png", &["a -t 1.png", "a"], "a -t 1.png", [1.0; 2]),
             ("-x.png", &["-x.png"], "-x.png", [1.0; 2]),
             ("wall 2.png", &["wall", "wall 2.png"], "wall 2.png", [1.0; 2]),

@@ -914,3 +914,27 @@ fn a_model_that_is_no_file_is_refused() {
         }
     }
 }
+
+#[test]
+fn the_first_definition_of_a_material_counts_in_one_library_and_in_several() {
+    let (red, blue) = ("newmtl m\nKd 1 0 0\n", "newmtl m\nKd 0 0 1\n");
+    let both = format!("{red}newmtl unused\nKd 1 1 1\nnewmtl unused\n{blue}");
+    let files = [("red.mtl", red), ("blue.mtl", blue), ("both.mtl", &both), ("again.mtl", red)];
+    let faces = "usemtl m\nf 1 2 3\n";
+    for (obj, times) in [
+        (format!("mtllib red.mtl blue.mtl\n{SQUARE}{faces}"), Some(1)),
+        (format!("mtllib red.mtl\nmtllib blue.mtl\n{SQUARE}{faces}"), Some(1)),
+        (format!("mtllib red.mtl\n{SQUARE}{faces}mtllib blue.mtl\n{faces}"), Some(1)),
+        (format!("{SQUARE}{faces}mtllib red.mtl\nmtllib blue.mtl\n"), Some(1)),
+        (format!("mtllib both.mtl\n{SQUARE}{faces}"), Some(1)),
+        (format!("mtllib red.mtl again.mtl\n{SQUARE}{faces}"), None),
+    ] {
+        let folder = folder_with(&files);
+        let model = read_from(&folder, &obj).unwrap();
+        assert_eq!(model.materials[0].base_color, [1.0, 0.0, 0.0, 1.0], "{obj}");
+        let found = warnings(&model).into_iter().find(|(text, _)| text.contains("defined again"));
+        assert_eq!(found.as_ref().map(|(_, times)| *times), times, "{obj}");
+        assert!(found.is_none_or(|(text, _)| text.ends_with("(first: m)")));
+        check_chunks(&folder, obj.as_bytes());
+    }
+}

@@ -87,8 +87,9 @@ impl Reader {
             let line = String::from_utf8_lossy(&line);
             let (keyword, rest) = statement(&line);
             if keyword == "newmtl" {
-                self.looks.insert(rest.to_owned(), Look::default());
-                current = Some(rest.to_owned());
+                // The first definition of a name counts.
+                current = (!self.looks.contains_key(rest)).then(|| rest.to_owned());
+                self.looks.entry(rest.to_owned()).or_default();
                 continue;
             }
             let Some(look) = current.as_ref().and_then(|name| self.looks.get_mut(name)) else {
