@@ -269,12 +269,13 @@ impl Library {
 
     /// The names of `used` whose materials are defined again with other statements, each once.
     pub(super) fn redefined<'a>(&self, used: impl Iterator<Item = &'a [u8]>) -> Vec<&'a [u8]> {
-        let is_other = |entry: &&Entry| {
-            let first = &self.materials[self.by_name[&entry.name]];
-            first.statements != entry.statements
+        let is_other = |(number, entry): &(usize, &Entry)| {
+            let first = self.by_name[&entry.name];
+            first != *number && self.materials[first].statements != entry.statements
         };
+        let entries = self.materials.iter().enumerate();
         let others: BTreeSet<&[u8]> =
-            self.materials.iter().filter(is_other).map(|entry| &entry.name[..]).collect();
+            entries.filter(is_other).map(|(_, entry)| &entry.name[..]).collect();
         if others.is_empty() {
             return Vec::new();
         }

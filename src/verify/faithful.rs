@@ -13,7 +13,7 @@ use super::sample::area;
 use super::source::Source;
 use super::step::vertex_bounds;
 use crate::format::Scene;
-use crate::lattice::Quantization;
+use crate::lattice::{Lattice, Quantization};
 
 /// How far a point of a leaf may be from the source for rounding, metres: the [bound](vertex_bounds) of source
 /// vertices, and half a step along each axis for each cut on the way to the leaf, since a cut rounds
@@ -108,7 +108,11 @@ pub(super) fn faithful(
         .collect();
     let reference = if lattice.is_some() { source.built() } else { surface };
     let coverage = coverage(reference, leaves, geometry, &moved, || progress.done(1));
-    let wrong = coverage.groups.iter().filter(|group| group.is_wrong());
+    let is_unseen = |group: &&Group| {
+        group.source <= group.bound
+            || (group.leaves == 0.0 && vanishes(reference.corners(group.triangle)))
+    };
+    let wrong = coverage.groups.iter().filter(|group| group.is_wrong() && !is_unseen(group));
     for Group { triangle, source, leaves, bound } in wrong {
         figures.wrong_triangles += 1;
         let at = reference.corners(*triangle)[0];
@@ -126,7 +130,7 @@ pub(super) fn faithful(
             HINT,
         );
     }
-    let unseen = coverage.groups.iter().filter(|group| group.source <= group.bound);
+    let unseen = coverage.groups.iter().filter(is_unseen);
     figures.unseen_triangles = unseen.clone().count() as u64;
     figures.unseen_area = unseen.map(|group| group.source).sum();
 
@@ -230,9 +234,37 @@ fn sought_vertices(source: &Source, apart: impl Fn(DVec3, DVec3) -> bool) -> Vec
     let mut sought = vec![false; surface.positions().len()];
     for (number, triangle) in (0..).zip(surface.triangles()) {
         let [a, b, c] = surface.corners(number);
-        if apart(a, b) && apart(b, c) && apart(c, a) {
+        if apart(a, b) && apart(b, c) && apart(c, a) && !vanishes([a, b, c]) {
             triangle.iter().for_each(|&vertex| sought[vertex as usize] = true);
         }
     }
     sought
+}
+
+/// True if two corners of a triangle may be one on the lattice of any block that holds it, however
+/// small the block is. The build leaves such triangles out, and says so.
+fn vanishes([a, b, c]: [DVec3; 3]) -> bool {
+    let extent = (a.max(b).max(c) - a.min(b).min(c)).max_element();
+    let magnitude = [a, b, c].map(|corner| corner.abs().max_element()).into_iter();
+    let Lattice { step } = Lattice::for_extent(extent, magnitude.fold(0.0, f64::max));
+    [a - b, b - c, c - a].iter().any(|edge| edge.abs().max_element() <= step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_vanish_that_no_lattice_of_their_size_tells_from_a_line() {
+        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        for (corners, expected) in [
+            ([at(0., 0., 0.), at(0., 0., 20.), at(1e15, 1e15, 0.)], true),
+            ([at(0., 0., 0.), at(0., 0., 20.), at(1e7, 0., 0.)], false),
+            ([at(0., 0., 0.), at(0., 0., 1e-9), at(1., 0., 0.)], true),
+            ([at(0., 0., 0.), at(0., 0., 1e-9), at(1e-3, 0., 0.)], false),
+            ([at(5e6, 0., 0.), at(5e6, 0., 1.), at(5e6 + 1., 0., 0.)], false),
+        ] {
+            assert_eq!(vanishes(corners), expected, "{corners:?}");
+        }
+    }
 }

@@ -919,7 +919,9 @@ fn a_model_that_is_no_file_is_refused() {
 fn the_first_definition_of_a_material_counts_in_one_library_and_in_several() {
     let (red, blue) = ("newmtl m\nKd 1 0 0\n", "newmtl m\nKd 0 0 1\n");
     let both = format!("{red}newmtl unused\nKd 1 1 1\nnewmtl unused\n{blue}");
-    let files = [("red.mtl", red), ("blue.mtl", blue), ("both.mtl", &both), ("again.mtl", red)];
+    let red = format!("{red}newmtl other\nKd nan 0 0\n");
+    let files =
+        [("red.mtl", &red[..]), ("blue.mtl", blue), ("both.mtl", &both), ("again.mtl", &red)];
     let faces = "usemtl m\nf 1 2 3\n";
     for (obj, times) in [
         (format!("mtllib red.mtl blue.mtl\n{SQUARE}{faces}"), Some(1)),

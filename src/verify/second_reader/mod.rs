@@ -93,7 +93,8 @@ fn differences(ours: &Content, theirs: &Content) -> Compared {
         }
         let (Some(a), Some(b)) = (first.mean_color(), second.mean_color()) else { continue };
         compared.materials[0] += 1;
-        if (0..3).any(|channel| (a[channel] - b[channel]).abs() > OTHER_COLOR) {
+        let is_same = |channel: usize| (a[channel] - b[channel]).abs() <= OTHER_COLOR;
+        if !(0..3).all(is_same) {
             let text = |color: [f64; 3]| color.map(|c| format!("{c:.0}")).join(",");
             let (a, b) = (text(a), text(b));
             compared.differences.push(format!(

@@ -34,6 +34,8 @@ struct Reader {
     material: Option<String>,
     polygons: Polygons,
     samples: BTreeMap<PathBuf, Samples>,
+    /// By the name of a material, triangles whose colour is that of their vertices: area and vertices.
+    colored: BTreeMap<String, Vec<(f64, [usize; 3])>>,
     content: Content,
     /// Faces that name vertices that are not there, or have no coordinates.
     broken: u64,
@@ -41,7 +43,7 @@ struct Reader {
 
 /// Reads an OBJ file; or says why it is left alone.
 pub(super) fn read(file: &Path) -> Result<Content, String> {
-    let bytes = std::fs::read(file).map_err(|error| error.to_string())?;
+    let bytes = plain_text(std::fs::read(file).map_err(|error| error.to_string())?);
     let folder = file.parent().map(Path::to_owned).unwrap_or_default();
     let mut reader = Reader { folder, ..Reader::default() };
     for line in lines(&bytes) {
@@ -62,6 +64,7 @@ pub(super) fn read(file: &Path) -> Result<Content, String> {
     if reader.broken > 0 {
         return Err(format!("{} faces that name no vertices", reader.broken));
     }
+    reader.add_vertex_colors();
     for (texture, samples) in &reader.samples {
         if let Some(image) = Image::open(texture) {
             samples.take(&image, [Wrap::Repeat; 2], &mut reader.content.materials);
@@ -83,7 +86,7 @@ impl Reader {
         let path = self.folder.join(name.replace('\\', "/"));
         let Ok(bytes) = side_file::read(&path, side_file::MOST_LIBRARY_BYTES) else { return };
         let mut current = None;
-        for line in lines(&bytes) {
+        for line in lines(&plain_text(bytes)) {
             let line = String::from_utf8_lossy(&line);
             let (keyword, rest) = statement(&line);
             if keyword == "newmtl" {
@@ -99,6 +102,10 @@ impl Reader {
                 "kd" => {
                     let values: Vec<f64> = numbers(rest).collect();
                     match values[..] {
+                        _ if !values.iter().all(|value| value.is_finite()) => {
+                            look.is_doubtful = true;
+                        }
+                        [grey] => look.diffuse = Some([grey; 3]),
                         [r, g, b, ..] => look.diffuse = Some([r, g, b]),
                         _ => look.is_doubtful = true,
                     }
@@ -137,6 +144,27 @@ impl Reader {
         self.color(&corners, &places);
     }
 
+    /// Adds the colours of vertices, whose range is that of all of the file: bytes where all are
+    /// integers and some are above 1, else fractions of 1.
+    fn add_vertex_colors(&mut self) {
+        let parts = || self.colors.iter().flatten().flatten().copied();
+        let has_fractions = parts().any(|part| part.is_finite() && part.fract() != 0.0);
+        let is_bytes = !has_fractions && parts().any(|part| part > 1.0);
+        let full = if is_bytes { 255.0 } else { 1.0 };
+        let light = |vertex: usize| {
+            let color = self.colors[vertex].unwrap_or([full; 3]);
+            // Not a number is 0, which `max` makes of it.
+            color.map(|part| srgb_to_linear(part.max(0.0) / full))
+        };
+        for (name, triangles) in &self.colored {
+            let content = self.content.materials.entry(name.clone()).or_default();
+            for &(area, vertices) in triangles {
+                let [a, b, c] = vertices.map(light);
+                content.add(area, [0, 1, 2].map(|part| (a[part] + b[part] + c[part]) / 3.0));
+            }
+        }
+    }
+
     /// Adds the colours of a polygon, as a fan.
     fn color(&mut self, corners: &[(usize, Option<[f64; 2]>)], places: &[DVec3]) {
         // Where a material has this name itself, faces without one have another.
@@ -155,11 +183,9 @@ impl Reader {
             let colors = fan.map(|at| self.colors[corners[at].0]);
             let texcoords = fan.map(|at| corners[at].1);
             match (look, colors, texcoords) {
-                (None, [Some(a), Some(b), Some(c)], _) if self.material.is_none() => {
-                    content.add(
-                        area,
-                        [0, 1, 2].map(|i| (light(a)[i] + light(b)[i] + light(c)[i]) / 3.0),
-                    );
+                (None, [Some(_), Some(_), Some(_)], _) if self.material.is_none() => {
+                    let triangle = (area, fan.map(|at| corners[at].0));
+                    self.colored.entry(name.to_owned()).or_default().push(triangle);
                 }
                 (Some(look), [None, None, None], _) if look.is_doubtful => {}
                 (
@@ -182,10 +208,18 @@ impl Reader {
     }
 }
 
-/// Linear light of a vertex colour; above 1 it is of bytes.
-fn light(color: [f64; 3]) -> [f64; 3] {
-    let scale = if color.iter().any(|&part| part > 1.0) { 255.0 } else { 1.0 };
-    color.map(|part| srgb_to_linear(part / scale))
+/// A file's bytes in a superset of ASCII, without a byte-order mark.
+fn plain_text(bytes: Vec<u8>) -> Vec<u8> {
+    let (start, unit): (usize, fn([u8; 2]) -> u16) = match bytes[..] {
+        [0xef, 0xbb, 0xbf, ..] => return bytes[3..].to_vec(),
+        [0xff, 0xfe, ..] => (2, u16::from_le_bytes),
+        [0xfe, 0xff, ..] => (2, u16::from_be_bytes),
+        [(1..), 0, (1..), 0, ..] => (0, u16::from_le_bytes),
+        [0, (1..), 0, (1..), ..] => (0, u16::from_be_bytes),
+        _ => return bytes,
+    };
+    let units: Vec<u16> = bytes[start..].as_chunks().0.iter().map(|&pair| unit(pair)).collect();
+    String::from_utf16_lossy(&units).into_bytes()
 }
 
 /// The lines of a file, those joined that end in a backslash.

@@ -80,6 +80,74 @@ fn vertex_colours_and_what_is_not_understood() {
     assert!(check.passed && check.summary.contains("1 of 2 materials"), "{check:?}");
 }
 
+/// Both readers must agree on a file, and compare the colours of this many materials.
+fn assert_agree(folder: &TempDir, bytes: &[u8], colors: &str) {
+    let file = folder.path().join("city.obj");
+    fs::write(&file, bytes).unwrap();
+    let check = check(&[compare(&file, &load(&file).unwrap())]);
+    let text = String::from_utf8_lossy(bytes);
+    assert!(check.passed && check.summary.contains(colors), "{text}: {check:?}");
+}
+
+#[test]
+fn utf_16_is_read_with_every_end_of_lines() {
+    let folder = folder();
+    for end in ["\n", "\r\n", "\r"] {
+        let text = OBJ.replace('\n', end);
+        for bytes_of in [u16::to_le_bytes, u16::to_be_bytes] {
+            for text in [text.clone(), format!("\u{feff}{text}")] {
+                let bytes: Vec<u8> = text.encode_utf16().flat_map(bytes_of).collect();
+                assert_agree(&folder, &bytes, "2 of 2 materials");
+            }
+        }
+        assert_agree(&folder, format!("\u{feff}{text}").as_bytes(), "2 of 2 materials");
+    }
+    let mtl: Vec<u8> = MTL.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    fs::write(folder.path().join("a.mtl"), mtl).unwrap();
+    assert_agree(&folder, OBJ.as_bytes(), "2 of 2 materials");
+}
+
+#[test]
+fn ranges_of_vertex_colours_are_those_of_the_file() {
+    let folder = folder();
+    for colors in [
+        ["1 0 1", "255 128 0", "1 1 1"],
+        ["0.5 0.2 0.1", "255 128 0", "1 0 0"],
+        ["1.02 0.5 0.2", "1.02 0.5 0.2", "1 1 0"],
+        ["-1 0.5 nan", "0.5 0.5 0.5", "0 1 0"],
+        ["-7 nan 300", "1 0 9", "0 255 2"],
+        ["0 1 0", "1 0 0", "0 0 1"],
+    ] {
+        let [a, b, c] = colors;
+        let vertices = format!("v 0 0 0 {a}\nv 1 0 0 {b}\nv 0 1 0 {c}\nv 1 1 0 {a}\n");
+        // What makes the range known may come after the faces that it concerns.
+        for text in [
+            format!("{vertices}f 1 2 3\nf 2 3 4\n"),
+            format!("v 5 0 0 1 0 0\nv 6 0 0 0 0 1\nv 5 1 0 1 1 1\nf 1 2 3\n{vertices}f -1 -2 -3\n"),
+        ] {
+            assert_agree(&folder, text.as_bytes(), "1 of 1 materials");
+        }
+    }
+}
+
+#[test]
+fn values_of_kd_are_read_alike_or_left_alone() {
+    let folder = folder();
+    let obj = OBJ.replace("a.mtl", "b.mtl");
+    for (values, colors) in [
+        ("0.5", "2 of 2"),
+        ("255 128 0", "2 of 2"),
+        ("-1 2 0.5", "2 of 2"),
+        ("-1 2 nan", "1 of 2"),
+        ("inf", "1 of 2"),
+        ("xyz 1 1 1", "1 of 2"),
+        ("0.8 0.1 0.1\nnewmtl red\nKd 0 0 1", "2 of 2"),
+    ] {
+        fs::write(folder.path().join("b.mtl"), MTL.replace("0.8 0.1 0.1", values)).unwrap();
+        assert_agree(&folder, obj.as_bytes(), &format!("{colors} materials"));
+    }
+}
+
 /// A file in which each corner of a triangle is a vertex of its own, as a GLB of one material.
 fn glb(folder: &TempDir, json: &str, positions: &[[f32; 3]]) -> PathBuf {
     let bytes: Vec<u8> = positions.as_flattened().iter().flat_map(|at| at.to_le_bytes()).collect();
