@@ -364,6 +364,11 @@ impl Scene<'_> {
                 ));
             }
         }
+        if mode == Mode::Triangles && !corners.len().is_multiple_of(3) {
+            let what =
+                "list of triangles whose number of corners is no multiple of 3, the last left out";
+            self.warnings.add(format!("{}: {what}", self.path.display()), 1);
+        }
         let mut corners = triangles(corners, mode);
         // Nodes of this crate's own results end with skirts, which are no surface.
         let skirts = primitive.extras.as_ref().and_then(|extras| {
@@ -378,11 +383,12 @@ impl Scene<'_> {
 
         let normals: Option<Vectors<3>> = match attribute(Semantic::Normals) {
             Some(accessor) if !textured => {
-                let normals = self.buffers.vector_elements(accessor).ok();
-                let normals = normals.filter(|normals: &Vectors<3>| normals.len() == count);
-                let lost = if normals.is_none() { corners.len() } else { 0 };
-                self.stats.normals_dropped += lost as u64;
-                normals
+                let normals = normals_of(&self.buffers, accessor, count).map_err(|what| {
+                    let what =
+                        format!("NORMAL of a primitive: {what}; its faces' normals are used");
+                    self.warnings.add(format!("{}: {what}", self.path.display()), 1);
+                });
+                normals.ok()
             }
             _ => None,
         };
@@ -426,6 +432,23 @@ impl Scene<'_> {
         };
         let is_rounded = mesh.primitives.iter().any(|primitive| is_float(primitive) == Some(false));
         if is_rounded { SAME_ROUNDED_NORMAL } else { SAME_NORMAL }
+    }
+}
+
+/// The normals of a primitive with so many positions.
+fn normals_of<'b>(
+    buffers: &'b Buffers,
+    accessor: Index<gltf_json::Accessor>,
+    positions: usize,
+) -> Result<Vectors<'b, 3>, String> {
+    let normals: Vectors<3> = buffers.vector_elements(accessor)?;
+    match normals.len() == positions {
+        true => Ok(normals),
+        false => Err(format!(
+            "accessor {} has {} elements; expected {positions}, one for each position",
+            accessor.value(),
+            normals.len()
+        )),
     }
 }
 

@@ -53,14 +53,15 @@ impl InstanceAccessors {
     }
 }
 
-/// All placed meshes of the default scene (the first where none is default; every node where there
-/// is no scene), in the order of the hierarchy. The file's CESIUM_RTC moves all of them; nodes that
+/// All placed meshes of the default scene (the first where none is default or the default is not
+/// there; every node where there is no scene), in the order of the hierarchy. The file's CESIUM_RTC moves all of them; nodes that
 /// KHR_node_visibility hides, and those below, are left out.
 pub(super) fn placements(json: &Value) -> Result<Vec<Placement>, String> {
     let nodes = json["nodes"].as_array().map_or(&[][..], Vec::as_slice);
     let children_of = |node: &Value| indices(&node["children"]);
     let scene = json["scene"].as_u64().unwrap_or(0) as usize;
-    let roots = match json["scenes"].get(scene) {
+    let scenes = &json["scenes"];
+    let roots = match scenes.get(scene).or_else(|| scenes.get(0)) {
         Some(scene) => indices(&scene["nodes"]),
         None => {
             let mut is_child = vec![false; nodes.len()];

@@ -1,4 +1,5 @@
 //! What a glTF file asks for and import does not read, counted by the primitives that it concerns.
+//! What concerns no primitive or the whole file is counted once.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -80,15 +81,14 @@ fn is_covered(name: &str) -> bool {
 
 /// Adds a warning for each thing that changes how placed primitives look and is not read, with their number.
 pub(super) fn warn(path: &Path, json: &Value, placements: &[Placement], warnings: &mut Warnings) {
+    warn_of_file(path, json, warnings);
     let mut counts: BTreeMap<String, u64> = BTreeMap::new();
-    let mut all_primitives = 0;
     let mut found = BTreeSet::new();
     for placement in placements {
         let node = &json["nodes"][placement.node];
         let mesh = &json["meshes"][placement.mesh];
         let weights = if node["weights"].is_array() { &node["weights"] } else { &mesh["weights"] };
         for primitive in array(&mesh["primitives"]) {
-            all_primitives += 1;
             found.clear();
             extensions([node, mesh, primitive], &mut found);
             if let Some(material) = primitive["material"].as_u64() {
@@ -111,14 +111,55 @@ pub(super) fn warn(path: &Path, json: &Value, placements: &[Placement], warnings
             }
         }
     }
-    // What no primitive names, such as lights, concerns all of them.
-    for name in names(json, "extensionsUsed").chain(names(json, "extensionsRequired")) {
-        if !is_covered(name) && !name.starts_with("KHR_materials_") {
-            counts.entry(of_extension(name)).or_insert(all_primitives);
+    // Such as lights. A file may also list what nothing in it uses.
+    let mut others = BTreeSet::new();
+    all_extensions(json, &mut others);
+    others.extend(names(json, "extensionsRequired"));
+    for name in others {
+        let is_named = is_covered(name) || counts.contains_key(&of_extension(name));
+        if !is_named && !name.starts_with("KHR_materials_") {
+            let what = format!("the extension {name} is not read; no shown primitive has it");
+            warnings.add(format!("{}: {what}", path.display()), 1);
         }
     }
     for (what, count) in counts {
         warnings.add(format!("{}: primitive with {what}", path.display()), count);
+    }
+}
+
+/// Warns of what is wrong with fields that concern the whole file.
+fn warn_of_file(path: &Path, json: &Value, warnings: &mut Warnings) {
+    let scene = &json["scene"];
+    let is_there = scene.as_u64().is_some_and(|index| !json["scenes"][index as usize].is_null());
+    if !scene.is_null() && !is_there {
+        let what = match array(&json["scenes"]).is_empty() {
+            true => "all nodes are shown",
+            false => "the first is shown",
+        };
+        warnings.add(format!("{}: there is no scene {scene}; {what}", path.display()), 1);
+    }
+    let center = &json["extensions"]["CESIUM_RTC"];
+    if center.is_object() && center["center"].is_null() {
+        warnings.add(format!("{}: CESIUM_RTC without center, ignored", path.display()), 1);
+    }
+}
+
+/// Adds the names of all extensions that some object of the file has.
+fn all_extensions<'a>(value: &'a Value, found: &mut BTreeSet<&'a str>) {
+    match value {
+        Value::Array(values) => values.iter().for_each(|value| all_extensions(value, found)),
+        Value::Object(fields) => {
+            for (name, value) in fields {
+                if let ("extensions", Some(names)) = (&name[..], value.as_object()) {
+                    found.extend(names.keys().map(String::as_str));
+                }
+                // Application data may have any fields.
+                if name != "extras" {
+                    all_extensions(value, found);
+                }
+            }
+        }
+        _ => {}
     }
 }
 

@@ -1,5 +1,6 @@
 //! Reads a path, and says of a bad one what is wrong where.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -55,19 +56,37 @@ fn parse(text: impl Read, up: UpAxis) -> Result<CameraPath, String> {
     while next(&mut reader, &mut record)? {
         let row = Row { columns: &columns, record: &record };
         let line = line_of(&reader, &record);
-        let frame = row.frame(up, frames.last()).map_err(|what| format!("line {line}: {what}"))?;
+        let before = frames.last().zip(lines.last().copied());
+        let frame = row.frame(up, before).map_err(|what| format!("line {line}: {what}"))?;
         frames.push(frame);
         lines.push(line);
     }
     if frames.is_empty() {
         return Err("expected a row for each frame after the header, found none".to_owned());
     }
+    check_numbers(&frames, &lines, &columns)?;
     let stamps: Vec<f64> = frames.iter().map(|frame| frame.time_s).collect();
     check_seconds(&stamps).map_err(|wrong| {
         let (line, column) = (lines[wrong.row], columns.time + 1);
         format!("line {line}: column {column} (time_s): expected seconds, found {}", wrong.found)
     })?;
     Ok(CameraPath { frames })
+}
+
+/// Refuses a frame number that comes twice: reports name frames by it.
+fn check_numbers(frames: &[PathFrame], lines: &[u64], columns: &Columns) -> Result<(), String> {
+    let mut known: BTreeMap<u64, u64> = BTreeMap::new();
+    for (frame, &line) in frames.iter().zip(lines) {
+        if let Some(first) = known.insert(frame.frame, line) {
+            return Err(format!(
+                "line {line}: column {} (frame): expected each number once, found {} as in line \
+                 {first}; number the frames anew",
+                columns.frame + 1,
+                frame.frame
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Reads the next line that is not blank; false at the end.
@@ -108,16 +127,21 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    fn frame(&self, up: UpAxis, before: Option<&PathFrame>) -> Result<PathFrame, String> {
+    /// The frame of this row. `before` is that of the row before, with its line.
+    fn frame(&self, up: UpAxis, before: Option<(&PathFrame, u64)>) -> Result<PathFrame, String> {
         let (columns, found) = (self.columns, self.record.len());
         if found != columns.names.len() {
             return Err(format!("expected {} columns, found {found}", columns.names.len()));
         }
         let frame = self.frame_number()?;
         let time_s = self.number(columns.time)?;
-        if let Some(before) = before.filter(|before| time_s < before.time_s) {
-            let expected = format!("at least the {} of the row before", before.time_s);
-            return Err(self.wrong(columns.time, &expected));
+        if let Some((before, line)) = before.filter(|(before, _)| time_s < before.time_s) {
+            return Err(format!(
+                "column {} (time_s): time runs backwards, from {} in line {line} to {time_s}; sort \
+                 the rows by time, or put joined recordings into files of their own",
+                columns.time + 1,
+                before.time_s
+            ));
         }
         let position = DVec3::from_array(self.numbers(columns.eye)?);
         let rotation = self.rotation(up, position)?;

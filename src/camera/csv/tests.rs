@@ -80,7 +80,7 @@ fn a_bad_row_is_named_with_line_and_column_and_what_was_expected() {
         ("1,0,1,2,3,0,0,0,0,60", "columns 6,7,8,9 (qx,qy,qz,qw)", "expected a quaternion"),
         ("1,0,1,2,3,0,0,0,1,0", "column 10 (fov_y_deg)", "less than 180"),
         ("1,0,1,2,3,0,0,0,1,180", "column 10 (fov_y_deg)", "found \"180\""),
-        ("1,-1,1,2,3,0,0,0,1,60", "column 2 (time_s)", "expected at least the 0 of the row"),
+        ("1,-1,1,2,3,0,0,0,1,60", "column 2 (time_s)", "backwards, from 0 in line 4 to -1; sort"),
         ("1,0,1,2,3,0,0,0,1", "expected 10 columns", "found 9"),
         ("1,0,1,2,3,0,0,0,1,60,5", "expected 10 columns", "found 11"),
     ] {
@@ -233,4 +233,16 @@ proptest! {
         text.extend(bytes);
         let _ = parse(&text);
     }
+}
+
+#[test]
+fn a_frame_number_that_comes_twice_is_refused_with_both_lines() {
+    let row = |frame: u64| format!("{frame},{frame},1,2,3,0,0,0,1,60\n");
+    let text = |frames: &[u64]| -> String {
+        [format!("{HEADER}\n"), frames.iter().map(|&frame| row(frame)).collect()].concat()
+    };
+    let what = refused(text(&[4, 5, 5]));
+    assert!(what.starts_with("line 4: column 1 (frame): expected each number once"), "{what}");
+    assert!(what.contains("found 5 as in line 3"), "{what}");
+    assert!(parse(text(&[4, 7, 9])).is_ok());
 }

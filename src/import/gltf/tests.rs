@@ -317,7 +317,7 @@ fn what_changes_the_look_and_is_not_read_is_named_with_its_primitives() {
             json["extensionsUsed"] = json!([extension]);
         }
     };
-    let cases: [(&str, u64, &dyn Fn(&mut Value)); 12] = [
+    let cases: [(&str, u64, &dyn Fn(&mut Value)); 11] = [
         ("extension KHR_materials_transmission", 2, &material("KHR_materials_transmission")),
         (
             "extension KHR_materials_emissive_strength",
@@ -343,10 +343,6 @@ fn what_changes_the_look_and_is_not_read_is_named_with_its_primitives() {
                 "target": {"node": 2, "path": "translation"}}], "samplers": []}]);
             json["nodes"] = json!([{"mesh": 0}, {"mesh": 0}, {"children": [0]}]);
             json["scenes"][0]["nodes"] = json!([2, 1]);
-        }),
-        ("extension KHR_lights_punctual", 4, &|json| {
-            json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
-            json["extensionsRequired"] = json!(["KHR_lights_punctual"]);
         }),
         ("texture in KHR_texture_basisu alone", 2, &|json| {
             json["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
@@ -865,5 +861,78 @@ fn buffers_that_are_no_files_are_refused_and_images_warned_of() {
         json["buffers"][0]["uri"] = name.into();
         let refusal = read(&path, &glb(&json, &binary)).unwrap_err();
         assert!(refusal.contains("buffer 0: ") && refusal.contains(what), "{refusal}");
+    }
+}
+
+#[test]
+fn extensions_that_no_primitive_has_are_named_only_if_something_has_them() {
+    let (json, binary) = square();
+    let warnings = |edit: &dyn Fn(&mut Value)| -> Vec<(String, u64)> {
+        let mut json = json.clone();
+        json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+        edit(&mut json);
+        let model = read_glb(&json, &binary).unwrap();
+        model.warnings.iter().map(|(what, count)| (what.to_owned(), count)).collect()
+    };
+    assert_eq!(warnings(&|json| json["extras"] = json!({"extensions": {"A_b": 1}})), []);
+    let expected =
+        "dir/city.glb: the extension KHR_lights_punctual is not read; no shown primitive has it";
+    let uses: [&dyn Fn(&mut Value); 3] = [
+        &|json| json["extensionsRequired"] = json!(["KHR_lights_punctual"]),
+        &|json| json["extensions"]["KHR_lights_punctual"] = json!({"lights": []}),
+        &|json| {
+            let light = json!({"extensions": {"KHR_lights_punctual": {"light": 0}}});
+            json["nodes"].as_array_mut().unwrap().push(light);
+        },
+    ];
+    for edit in uses {
+        assert_eq!(warnings(edit), [(expected.to_owned(), 1)]);
+    }
+}
+
+#[test]
+fn a_missing_scene_center_or_corner_is_warned_of() {
+    let (json, binary) = square();
+    let cases: [(&str, usize, &dyn Fn(&mut Value)); 5] = [
+        ("there is no scene 7; the first is shown", 2, &|json| json["scene"] = 7.into()),
+        ("there is no scene 0; all nodes are shown", 2, &|json| _ = json["scenes"].take()),
+        ("CESIUM_RTC without center, ignored", 2, &|json| {
+            json["extensions"] = json!({"CESIUM_RTC": {"centre": [1, 2, 3]}});
+        }),
+        ("list of triangles whose number of corners is no multiple of 3", 1, &|json| {
+            json["accessors"][2]["count"] = 5.into();
+        }),
+        ("list of triangles whose number of corners is no multiple of 3", 1, &|json| {
+            _ = json["meshes"][0]["primitives"][0]["indices"].take();
+        }),
+    ];
+    for (expected, triangles, edit) in cases {
+        let mut json = json.clone();
+        edit(&mut json);
+        let model = read_glb(&json, &binary).unwrap();
+        let found: Vec<_> = model.warnings.iter().collect();
+        assert_eq!(model.triangle_count(), triangles, "{expected}");
+        assert!(found.len() == 1 && found[0].0.contains(expected) && found[0].1 == 1, "{found:?}");
+    }
+}
+
+#[test]
+fn normals_of_another_length_or_type_are_named_with_their_accessor() {
+    let (mut json, binary) = square();
+    json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = 3.into();
+    for (kind, count, expected) in [
+        ("VEC3", 3, "accessor 3 has 3 elements; expected 4, one for each position"),
+        ("VEC2", 4, "accessor 3 has 2 components; expected 3"),
+    ] {
+        json["accessors"].as_array_mut().unwrap().truncate(3);
+        json["accessors"]
+            .as_array_mut()
+            .unwrap()
+            .push(json!({"bufferView": 0, "componentType": 5126, "count": count, "type": kind}));
+        let model = read_glb(&json, &binary).unwrap();
+        let found: Vec<_> = model.warnings.iter().collect();
+        let expected =
+            format!("dir/city.glb: NORMAL of a primitive: {expected}; its faces' normals are used");
+        assert_eq!(found, [(&expected[..], 1)]);
     }
 }
