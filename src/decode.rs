@@ -77,12 +77,19 @@ fn without_alpha(rgba: &[u8]) -> Vec<u8> {
 /// 16-bit, grey and palette images become 8-bit RGB. The result is RGBA only where some alpha is
 /// below 255, from the image itself or from its opacity file, which may be of another size.
 pub fn decode_texture(source: &TextureSource) -> Result<DecodedTexture> {
+    decode_and_check(source).map(|(image, _)| image)
+}
+
+/// The same, and true if it is a JPEG without its end, whose last rows are made up.
+pub(crate) fn decode_and_check(source: &TextureSource) -> Result<(DecodedTexture, bool)> {
     let file = file_of(source);
     let bytes = bytes_of(source)?;
+    let is_cut_short = is_jpeg(&bytes) && is_without_end(&bytes);
     let image = decode(&bytes).map_err(|what| refusal(&file, source, what))?;
-    let Some(opacity) = &source.opacity else { return Ok(image) };
+    drop(bytes);
+    let Some(opacity) = &source.opacity else { return Ok((image, is_cut_short)) };
     let mask = decode(&bytes_of_file(opacity)?).map_err(|what| Error::input(opacity, what))?;
-    Ok(with_opacity(image, &mask))
+    Ok((with_opacity(image, &mask), is_cut_short))
 }
 
 /// The alpha of the image in `file`, or its luminance where it has no transparency; 255 there where
@@ -176,6 +183,26 @@ fn check_size(width: u32, height: u32) -> Result<(u32, u32), String> {
 
 fn is_jpeg(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0xff, 0xd8, 0xff])
+}
+
+/// True if a JPEG has no end-of-image marker (ITU-T T.81, annex B). Those of thumbnails in its
+/// segments do not count.
+fn is_without_end(jpeg: &[u8]) -> bool {
+    let mut at = 0;
+    while let Some(rest) = jpeg.get(at..)
+        && let Some(found) = memchr::memchr(0xff, rest)
+    {
+        at += found;
+        at += match jpeg[at + 1..] {
+            [0xd9, ..] => return false,
+            // A fill byte; then stuffed zeros of compressed data and markers without a segment.
+            [0xff, ..] => 1,
+            [0x00 | 0x01 | 0xd0..=0xd8, ..] => 2,
+            [_, high, low, ..] => 2 + usize::from(u16::from_be_bytes([high, low])),
+            _ => return true,
+        };
+    }
+    true
 }
 
 fn size_of(mut reader: impl BufRead + Seek) -> Result<(u32, u32), String> {
@@ -340,6 +367,25 @@ mod tests {
         assert_eq!(texture_size(&opaque).unwrap(), (2, 1));
         let image = decode_texture(&embedded(encoded(&two_texels(7), ImageFormat::Png))).unwrap();
         assert_eq!(image.pixels, [0, 100, 50, 7, 200, 100, 50, 7]);
+    }
+
+    #[test]
+    fn a_jpeg_without_its_end_is_recognised() {
+        let image = image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([x as u8, y as u8, 7]));
+        let jpeg = encoded(&image.into(), ImageFormat::Jpeg);
+        let is_cut_short = |bytes: &[u8]| decode_and_check(&embedded(bytes.to_vec())).unwrap().1;
+        assert!(!is_cut_short(&jpeg));
+        assert!(!is_cut_short(&[&jpeg[..], &[0; 99]].concat()), "padding");
+        assert!(is_cut_short(&jpeg[..jpeg.len() - 2]) && is_cut_short(&jpeg[..jpeg.len() * 3 / 4]));
+        // A segment with a whole thumbnail.
+        let length = (jpeg.len() + 2) as u16;
+        let segment = [&[0xff, 0xe5][..], &length.to_be_bytes(), &jpeg].concat();
+        let with_thumbnail = [&jpeg[..2], &segment, &jpeg[2..]].concat();
+        assert!(!is_cut_short(&with_thumbnail));
+        assert!(is_cut_short(&with_thumbnail[..with_thumbnail.len() - 9]));
+        for length in 0..jpeg.len() {
+            assert!(is_without_end(&jpeg[..length]));
+        }
     }
 
     #[test]

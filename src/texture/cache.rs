@@ -44,8 +44,16 @@ pub struct TextureCache<'a> {
 struct Slot {
     takers: u32,
     state: State,
-    /// The image has an alpha channel that no material uses.
+    findings: Findings,
+}
+
+/// What is imperfect about a decoded image.
+#[derive(Clone, Copy, Debug, Default)]
+struct Findings {
+    /// It has an alpha channel that no material uses.
     has_unused_alpha: bool,
+    /// It is a JPEG without its end.
+    is_cut_short: bool,
 }
 
 #[derive(Debug, Default)]
@@ -96,7 +104,7 @@ impl<'a> TextureCache<'a> {
         let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
         slot.takers = slot.takers.saturating_sub(1);
         if matches!(slot.state, State::Waiting) {
-            (slot.state, slot.has_unused_alpha) = self.decode(texture);
+            (slot.state, slot.findings) = self.decode(texture);
         }
         let State::Decoded(decoded) = &slot.state else { return None };
         let decoded = Arc::clone(decoded);
@@ -106,26 +114,26 @@ impl<'a> TextureCache<'a> {
         Some(decoded)
     }
 
-    /// The image, and whether it has an alpha channel that no material uses.
-    fn decode(&self, texture: u32) -> (State, bool) {
+    fn decode(&self, texture: u32) -> (State, Findings) {
         let source = &self.model.textures[texture as usize];
-        let image = match decode::decode_texture(source) {
-            Ok(image) => image,
-            Err(error) => return (State::Failed(error.to_string()), false),
+        let (image, is_cut_short) = match decode::decode_and_check(source) {
+            Ok(decoded) => decoded,
+            Err(error) => return (State::Failed(error.to_string()), Findings::default()),
         };
         let bytes = image.texels() * u64::from(image.channels);
         if image.texels() == 0 || image.pixels.len() as u64 != bytes {
             let size = format!("{} × {}", image.width, image.height);
             let what = format!("{}: an image of {size} texels", source.name);
-            return (State::Failed(what), false);
+            return (State::Failed(what), Findings::default());
         }
         let is_used = self.plan.needs_alpha(texture);
         let has_alpha = image.has_transparency();
         let image = if is_used && has_alpha { image } else { image.into_opaque() };
-        (State::Decoded(Arc::new(Decoded::new(image))), has_alpha && !is_used)
+        let findings = Findings { has_unused_alpha: has_alpha && !is_used, is_cut_short };
+        (State::Decoded(Arc::new(Decoded::new(image))), findings)
     }
 
-    /// One warning for each image that could not be decoded, and for each of an OBJ whose alpha
+    /// One warning for each image that could not be decoded or is cut short, and for each of an OBJ whose alpha
     /// channel no material uses, in the model's order.
     pub fn warnings(&self) -> Warnings {
         let mut warnings = Warnings::default();
@@ -134,7 +142,15 @@ impl<'a> TextureCache<'a> {
             if let State::Failed(what) = &slot.state {
                 warnings.add(format!("{what}; drawn without texture"), 1);
             }
-            if slot.has_unused_alpha && is_obj(self.model) {
+            if slot.findings.is_cut_short {
+                let what = format!(
+                    "{}: texture {} is a JPEG without its end; what is missing of it is grey",
+                    self.model.source.display(),
+                    source.name
+                );
+                warnings.add(what, 1);
+            }
+            if slot.findings.has_unused_alpha && is_obj(self.model) {
                 let what = format!(
                     "{}: texture {} has transparency that its material does not use, drawn opaque; \
                      a map_d of the same file uses it",
