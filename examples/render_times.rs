@@ -115,6 +115,7 @@ fn ground(node: u32, across: u32, textured: bool) -> NodeMesh {
         wrap: [Wrap::Clamp; 2],
         alpha: AlphaMode::Opaque,
         double_sided: true,
+        is_unlit: false,
     };
     let texcoords = vertices.map(|corner| corner.map(share)).collect();
     let primitive = Primitive {

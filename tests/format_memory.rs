@@ -77,6 +77,7 @@ fn node_file() -> Vec<u8> {
                 wrap: [Wrap::Clamp; 2],
                 alpha: AlphaMode::Mask { cutoff: 0.5 },
                 double_sided: true,
+                is_unlit: false,
             },
         }],
     };

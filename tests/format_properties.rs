@@ -121,14 +121,16 @@ fn surface(images: usize) -> impl Strategy<Value = Surface> {
     let image =
         if images == 0 { Just(None).boxed() } else { proptest::option::of(0..images).boxed() };
     let color = [0.0..=1.0f32, 0.0..=1.0f32, 0.0..=1.0f32, 0.0..=1.0f32];
-    (color, image, [wrap.clone(), wrap], alpha, any::<bool>()).prop_map(
-        |(base_color, image, wrap, alpha, double_sided)| Surface {
+    (color, image, [wrap.clone(), wrap], alpha, any::<[bool; 2]>()).prop_map(
+        |(base_color, image, wrap, alpha, [double_sided, is_unlit])| Surface {
             base_color,
             image,
             // Without a picture there is nothing to wrap, and nothing is kept.
             wrap: if image.is_some() { wrap } else { [Wrap::Repeat; 2] },
             alpha,
             double_sided,
+            // Those with a picture always are.
+            is_unlit: is_unlit && image.is_none(),
         },
     )
 }

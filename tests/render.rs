@@ -46,6 +46,7 @@ fn plain(color: [f32; 3]) -> Surface {
         wrap: [Wrap::Repeat; 2],
         alpha: AlphaMode::Opaque,
         double_sided: true,
+        is_unlit: false,
     }
 }
 

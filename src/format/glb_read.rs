@@ -417,7 +417,9 @@ impl<'a> Reader<'a> {
                 (Some(texture.source), [wrap(sampler.wrap_s)?, wrap(sampler.wrap_t)?])
             }
         };
-        Ok(Surface { base_color, image, wrap, alpha, double_sided: material.double_sided })
+        let double_sided = material.double_sided;
+        let is_unlit = image.is_none() && material.extensions.is_some();
+        Ok(Surface { base_color, image, wrap, alpha, double_sided, is_unlit })
     }
 
     fn image(&mut self, image: &schema::Image) -> Parsed<NodeImage> {

@@ -41,6 +41,20 @@ fn reads_back_what_it_wrote_bit_for_bit() {
     }
 }
 
+#[test]
+fn unlit_surfaces_without_an_image_stay_so() {
+    let mut mesh = mesh();
+    let primitive = mesh.primitives.iter_mut().find(|primitive| primitive.surface.image.is_none());
+    let primitive = primitive.unwrap();
+    primitive.surface.is_unlit = true;
+    primitive.normals.clear();
+    mesh.primitives.retain(|primitive| primitive.surface.image.is_none());
+    mesh.images.clear();
+    let bytes = write(&mesh, UpAxis::Z);
+    assert_eq!(json_of(&bytes)["extensionsUsed"], serde_json::json!(["KHR_materials_unlit"]));
+    assert_eq!(read(&bytes).unwrap(), mesh);
+}
+
 /// A mesh on a lattice of a quarter, as a quantised build makes it.
 fn mesh_in_quarters() -> NodeMesh {
     let mut mesh = mesh();

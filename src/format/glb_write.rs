@@ -426,7 +426,8 @@ impl Writer {
     fn material(&mut self, surface: &Surface) -> usize {
         let base_color_texture =
             surface.image.map(|image| TextureInfo { index: self.texture(image, surface.wrap) });
-        if base_color_texture.is_some() && self.root.extensions_used.is_empty() {
+        let is_unlit = surface.image.is_some() || surface.is_unlit;
+        if is_unlit && self.root.extensions_used.is_empty() {
             self.root.extensions_used.push(UNLIT.into());
         }
         let (alpha_mode, alpha_cutoff) = match surface.alpha {
@@ -435,7 +436,7 @@ impl Writer {
             AlphaMode::Blend => (Some(schema::AlphaMode::Blend), None),
         };
         let material = schema::Material {
-            extensions: surface.image.map(|_| MaterialExtensions { unlit: Unlit {} }),
+            extensions: is_unlit.then_some(MaterialExtensions { unlit: Unlit {} }),
             pbr_metallic_roughness: Pbr {
                 base_color_factor: surface.base_color,
                 base_color_texture,

@@ -58,6 +58,9 @@ pub struct Surface {
     pub alpha: AlphaMode,
     /// Both sides are drawn.
     pub double_sided: bool,
+    /// A surface without an image is drawn without light; one with an image always is, and has false
+    /// here.
+    pub is_unlit: bool,
 }
 
 /// Triangles that look alike.

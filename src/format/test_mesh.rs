@@ -30,6 +30,7 @@ pub(crate) fn mesh() -> NodeMesh {
         wrap: [Wrap::Repeat; 2],
         alpha: AlphaMode::Opaque,
         double_sided: true,
+        is_unlit: false,
     };
     let photograph = Surface {
         base_color: [1.0; 4],
@@ -37,6 +38,7 @@ pub(crate) fn mesh() -> NodeMesh {
         wrap: [Wrap::Clamp; 2],
         alpha: AlphaMode::Opaque,
         double_sided: false,
+        is_unlit: false,
     };
     let fence = Surface {
         image: Some(1),

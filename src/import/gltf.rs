@@ -212,7 +212,7 @@ struct Decoded {
     texcoords: Vec<[f32; 2]>,
     /// One per position.
     colors: Option<Vec<[u16; 4]>>,
-    /// One per position, where the material has no texture: what has one is not lit.
+    /// One per position, where the material has no texture and is lit: what has a texture is not.
     normals: Option<Vec<[f64; 3]>>,
 }
 
@@ -382,7 +382,7 @@ impl Scene<'_> {
         }
 
         let normals: Option<Vectors<3>> = match attribute(Semantic::Normals) {
-            Some(accessor) if !textured => {
+            Some(accessor) if !textured && !made.material.is_unlit => {
                 let normals = normals_of(&self.buffers, accessor, count).map_err(|what| {
                     let what =
                         format!("NORMAL of a primitive: {what}; its faces' normals are used");

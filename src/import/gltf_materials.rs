@@ -107,6 +107,8 @@ impl<'a> Materials<'a> {
         let material = &mut result.material;
         material.name = json.name.clone().unwrap_or_else(|| format!("material {index}"));
         material.double_sided = json.double_sided;
+        material.is_unlit =
+            json.extensions.as_ref().is_some_and(|extensions| extensions.unlit.is_some());
         material.alpha = match json.alpha_mode {
             Checked::Valid(json_material::AlphaMode::Mask) => {
                 AlphaMode::Mask { cutoff: json.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0) }

@@ -45,6 +45,8 @@ pub struct Material {
     pub alpha: AlphaMode,
     /// Both sides of a triangle are drawn. OBJ says nothing of sides, so it is true there.
     pub double_sided: bool,
+    /// It is shown without light (KHR_materials_unlit). A texture is always shown so.
+    pub is_unlit: bool,
 }
 
 impl Material {
@@ -57,6 +59,7 @@ impl Material {
             wrap: [Wrap::Repeat; 2],
             alpha: AlphaMode::Opaque,
             double_sided: true,
+            is_unlit: false,
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::format::{Primitive, Surface};
 use crate::mesh::{AlphaMode, Normal, Wrap};
 
 /// What primitives are told apart by, besides their image.
-type AppearanceKey = (u8, u32, bool);
+type AppearanceKey = (u8, u32, bool, bool);
 
 /// The triangles of one primitive.
 struct Group {
@@ -68,7 +68,8 @@ impl NodeBuilder<'_> {
             let index = match last {
                 Some((same, same_image, index)) if same == material && same_image == image => index,
                 _ => {
-                    let key = (image, self.wrap_key(material, image), self.appearance(material));
+                    let key =
+                        (image, self.wrap_key(material, image), self.appearance(material, image));
                     let index = *by_appearance.entry(key).or_insert_with(|| {
                         groups.push(Group {
                             image,
@@ -96,7 +97,7 @@ impl NodeBuilder<'_> {
                 });
                 group.indices.push(slot);
             }
-            if image.is_none() && is_lit {
+            if image.is_none() && is_lit && !self.is_unlit(material, image) {
                 let face = face_normals[number];
                 group.normals.extend(triangle.map(|vertex| {
                     let own = self.mesh.normals.get(vertex as usize);
@@ -107,17 +108,24 @@ impl NodeBuilder<'_> {
         groups.into_iter().map(|group| self.primitive(group)).collect()
     }
 
-    /// Alpha and sides of a material, as a key.
-    fn appearance(&self, material: u32) -> AppearanceKey {
+    /// True if a material is shown without light where it has no image.
+    fn is_unlit(&self, material: u32, image: Option<usize>) -> bool {
+        let material = self.block.model.materials.get(material as usize);
+        image.is_none() && material.is_some_and(|material| material.is_unlit)
+    }
+
+    /// Alpha, sides and light of a material with an image, as a key.
+    fn appearance(&self, material: u32, image: Option<usize>) -> AppearanceKey {
+        let is_unlit = self.is_unlit(material, image);
         let Some(material) = self.block.model.materials.get(material as usize) else {
-            return (0, 0, true);
+            return (0, 0, true, is_unlit);
         };
         let (mode, cutoff) = match material.alpha {
             AlphaMode::Opaque => (0, 0),
             AlphaMode::Mask { cutoff } => (1, cutoff.to_bits()),
             AlphaMode::Blend => (2, 0),
         };
-        (mode, cutoff, material.double_sided)
+        (mode, cutoff, material.double_sided, is_unlit)
     }
 
     /// The wrapping of a primitive: the material's where the image is a repeating texture; in
@@ -173,6 +181,7 @@ impl NodeBuilder<'_> {
                 wrap: self.wrap(first, group.image),
                 alpha: source.map_or(AlphaMode::Opaque, |material| material.alpha),
                 double_sided: source.is_none_or(|material| material.double_sided),
+                is_unlit: self.is_unlit(first, group.image),
             },
             normals: group.normals,
             indices: group.indices,

@@ -7,7 +7,7 @@ use super::atlas::{Atlas, Page, Sheet, SheetImage};
 use super::level::{LevelImage, Region, level_images};
 use super::*;
 use crate::decode::DecodedTexture;
-use crate::format::{NodeImageData, NodeMesh};
+use crate::format::{NodeImageData, NodeMesh, Surface};
 use crate::mesh::{
     AlphaMode, Group, Material, Mesh, Model, Part, TextureData, TextureSource, Wrap,
 };
@@ -495,6 +495,27 @@ fn untextured_materials_become_one_primitive_with_colours() {
 
     scene.model.materials[1].base_color = [1.0; 4];
     assert!(nodes(&scene, &[1.0], FINEST).0[0].mesh.primitives[0].colors.is_empty());
+}
+
+#[test]
+fn unlit_materials_stay_apart_and_have_no_normals() {
+    let triangles = [(0, [[0.0; 2]; 3]), (1, [[0.0; 2]; 3]), (2, [[0.0; 2]; 3])];
+    let materials = [(None, Wrap::Repeat), (None, Wrap::Repeat), (Some(0), Wrap::Repeat)];
+    let mut scene = scene(&[numbered(8, 8)], &materials, &triangles);
+    for material in &mut scene.model.materials[1..] {
+        material.is_unlit = true;
+    }
+    let node = &nodes(&scene, &[1.0], FINEST).0[0];
+    let mut found: Vec<_> = node.mesh.primitives.iter().collect();
+    found.sort_by_key(|primitive| (primitive.surface.image, primitive.surface.is_unlit));
+    let found: Vec<_> = found
+        .iter()
+        .map(|primitive| {
+            let Surface { image, is_unlit, .. } = primitive.surface;
+            (image.is_some(), is_unlit, primitive.normals.len())
+        })
+        .collect();
+    assert_eq!(found, [(false, false, 3), (false, true, 0), (true, false, 0)]);
 }
 
 #[test]

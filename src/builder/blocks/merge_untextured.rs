@@ -10,14 +10,17 @@ pub fn merge_untextured(model: &mut Model) {
     let foldable = |material: &Material| {
         material.texture.is_none() && !matches!(material.alpha, AlphaMode::Mask { .. })
     };
-    let class = |material: &Material| (material.alpha == AlphaMode::Blend, material.double_sided);
+    let class = |material: &Material| {
+        [material.alpha == AlphaMode::Blend, material.double_sided, material.is_unlit]
+    };
     let mut is_used = vec![false; model.materials.len()];
     for part in &model.parts {
         if let Some(is_used) = is_used.get_mut(part.material as usize) {
             *is_used = true;
         }
     }
-    for sought in [(false, false), (false, true), (true, false), (true, true)] {
+    let classes = (0..8_u8).map(|bits| [4, 2, 1].map(|bit| bits & bit != 0));
+    for sought in classes {
         let in_class: Vec<bool> = model
             .materials
             .iter()
@@ -27,6 +30,7 @@ pub fn merge_untextured(model: &mut Model) {
         if used < 2 {
             continue;
         }
+        let [is_blended, double_sided, is_unlit] = sought;
         let folded = model.materials.len() as u32;
         for part in &mut model.parts {
             if !in_class.get(part.material as usize).copied().unwrap_or(false) {
@@ -46,8 +50,9 @@ pub fn merge_untextured(model: &mut Model) {
         }
         model.materials.push(Material {
             base_color: [1.0; 4],
-            alpha: if sought.0 { AlphaMode::Blend } else { AlphaMode::Opaque },
-            double_sided: sought.1,
+            alpha: if is_blended { AlphaMode::Blend } else { AlphaMode::Opaque },
+            double_sided,
+            is_unlit,
             ..Material::plain(format!("untextured {folded}"))
         });
     }
@@ -89,6 +94,18 @@ mod tests {
         assert_eq!(folded.materials[folded.parts[0].material as usize].base_color, [1.0; 4]);
         assert_eq!(folded.parts[0].colors[2], [65535, 0, 32768, 65535]);
         assert_eq!(folded.parts[1].colors[0], [0, 65535, 0, 65535]);
+    }
+
+    #[test]
+    fn lit_and_unlit_materials_stay_apart() {
+        let mut folded = model(&[[0.5; 4]; 4]);
+        folded.materials[2].is_unlit = true;
+        folded.materials[3].is_unlit = true;
+        merge_untextured(&mut folded);
+        let is_unlit =
+            |part: usize| folded.materials[folded.parts[part].material as usize].is_unlit;
+        assert_eq!([0, 1, 2, 3].map(is_unlit), [false, false, true, true]);
+        assert_eq!(folded.parts[2].material, folded.parts[3].material);
     }
 
     #[test]

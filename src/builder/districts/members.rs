@@ -181,6 +181,7 @@ impl Reader<'_> {
             wrap: surface.wrap,
             alpha: surface.alpha,
             double_sided: surface.double_sided,
+            is_unlit: surface.is_unlit,
         };
         let same = |known: &Material| Material { name: String::new(), ..known.clone() } == material;
         let known = materials.iter().position(same).unwrap_or_else(|| {

@@ -173,6 +173,7 @@ impl Made {
                     wrap: [Wrap::Clamp; 2],
                     alpha: AlphaMode::Opaque,
                     double_sided: true,
+                    is_unlit: false,
                 },
             });
             made.mesh.images.push(layer.image);

@@ -30,6 +30,7 @@ pub(super) fn mesh(triangles: &[[[f32; 3]; 3]]) -> NodeMesh {
                 wrap: [Wrap::Repeat; 2],
                 alpha: AlphaMode::Opaque,
                 double_sided: true,
+                is_unlit: false,
             },
         }],
     }

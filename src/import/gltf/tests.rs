@@ -806,6 +806,18 @@ fn tilted(normals: [[f32; 3]; 4], nodes: &[Value]) -> Result<(Vec<Option<DVec3>>
 }
 
 #[test]
+fn unlit_materials_are_unlit_and_take_no_normals() {
+    let (mut json, binary) = square();
+    json["materials"][0]["extensions"]["KHR_materials_unlit"] = json!({});
+    // One that is not there would be refused or warned of.
+    json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = 9.into();
+    let model = read_glb(&json, &binary).unwrap();
+    assert!(model.materials[0].is_unlit && model.warnings.is_empty());
+    assert!(model.parts[0].normals.is_empty());
+    assert!(!read_glb(&square().0, &binary).unwrap().materials[0].is_unlit);
+}
+
+#[test]
 fn normals_turn_with_their_node() {
     let nodes = [
         json!({}),

@@ -13,6 +13,7 @@ fn surface(image: Option<usize>) -> Surface {
         wrap: [Wrap::Repeat; 2],
         alpha: AlphaMode::Opaque,
         double_sided: true,
+        is_unlit: false,
     }
 }
 
