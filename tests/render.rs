@@ -662,3 +662,20 @@ fn a_picture_is_projected_from_where_it_was_taken_whatever_the_triangles() {
     let bent = error(None);
     assert!(bent > 1000.0, "{bent}");
 }
+
+#[test]
+fn unlit_surfaces_without_a_picture_keep_their_colour() {
+    let options = RenderOptions { shading: Shading::Photo, ..options() };
+    // They lean away from the camera, so that light changes the other one.
+    let leaning = |[left, right]: [f32; 2], is_unlit| {
+        let surface = Surface { is_unlit, ..plain([0.5; 3]) };
+        let mut primitive = rectangle([left, right], [-1.0, 1.0], 1.0, surface);
+        primitive.positions[2][2] -= 2.0;
+        primitive.positions[3][2] -= 2.0;
+        primitive
+    };
+    let scene = mesh(vec![leaning([-1.0, 0.0], true), leaning([0.0, 1.0], false)]);
+    let Some(image) = shot(&options, &scene) else { return };
+    assert_near(at(&image, -0.5, -0.5), [188; 3], 0);
+    assert!(at(&image, 0.5, -0.5) != [188; 3], "{:?}", at(&image, 0.5, -0.5));
+}

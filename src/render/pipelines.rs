@@ -32,6 +32,8 @@ pub(super) struct PipelineKey {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Texture {
     None,
+    /// None, and no light.
+    Unlit,
     Mapped,
     Projected,
 }
@@ -40,6 +42,7 @@ impl PipelineKey {
     pub fn of(draw: &Draw, options: &RenderOptions) -> Self {
         Self {
             texture: match (draw.picture, draw.projection) {
+                (DrawPicture::None, _) if draw.is_unlit => Texture::Unlit,
                 (DrawPicture::None, _) => Texture::None,
                 (_, None) => Texture::Mapped,
                 (_, Some(_)) => Texture::Projected,
@@ -69,14 +72,15 @@ impl PipelineKey {
     pub fn number(self) -> usize {
         let texture = match (self.texture, self.cut) {
             (Texture::None, cut) => usize::from(cut),
-            (Texture::Mapped, cut) => 2 + usize::from(cut),
-            (Texture::Projected, _) => 4,
+            (Texture::Unlit, cut) => 2 + usize::from(cut),
+            (Texture::Mapped, cut) => 4 + usize::from(cut),
+            (Texture::Projected, _) => 6,
         };
-        usize::from(self.alpha) * 10 + texture * 2 + usize::from(self.cull)
+        usize::from(self.alpha) * 14 + texture * 2 + usize::from(self.cull)
     }
 }
 
-const PIPELINES: usize = 30;
+const PIPELINES: usize = 42;
 
 const VERTEX: [VertexAttribute; 3] =
     vertex_attr_array![0 => Float32x3, 1 => Float32x2, 2 => Unorm8x4];
@@ -163,8 +167,10 @@ impl Pipelines {
 
     fn make(&self, device: &Device, key: PipelineKey) -> RenderPipeline {
         let (layout, vertex, fragment) = match (key.texture, key.cut) {
-            (Texture::None, false) => (&self.plain, "place_plain", "shade_plain"),
-            (Texture::None, true) => (&self.plain, "place_boxed_plain", "shade_boxed_plain"),
+            (Texture::None | Texture::Unlit, false) => (&self.plain, "place_plain", "shade_plain"),
+            (Texture::None | Texture::Unlit, true) => {
+                (&self.plain, "place_boxed_plain", "shade_boxed_plain")
+            }
             (Texture::Mapped, false) => (&self.textured, "place_textured", "shade_textured"),
             (Texture::Mapped, true) => {
                 (&self.textured, "place_boxed_textured", "shade_boxed_textured")

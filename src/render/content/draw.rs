@@ -47,6 +47,8 @@ pub struct Draw {
     pub alpha: Alpha,
     /// Seen from both sides.
     pub double_sided: bool,
+    /// Without a picture, and shown without light all the same.
+    pub is_unlit: bool,
     /// The picture is what a camera saw, and is projected from there: the depth of a vertex in that camera
     /// is the dot product of this with its position and 1. Texture coordinates alone would bend along
     /// large triangles.
@@ -59,6 +61,7 @@ impl Draw {
             && self.wrap == other.wrap
             && self.alpha == other.alpha
             && self.double_sided == other.double_sided
+            && self.is_unlit == other.is_unlit
             && self.projection == other.projection
     }
 }
@@ -131,12 +134,13 @@ fn looks(surface: &Surface, places: &[DrawPicture]) -> Option<Draw> {
         AlphaMode::Blend => Alpha::Screen,
     };
     let double_sided = surface.double_sided;
-    Some(Draw { indices: 0..0, picture, wrap, alpha, double_sided, projection: None })
+    let is_unlit = surface.image.is_none() && surface.is_unlit;
+    Some(Draw { indices: 0..0, picture, wrap, alpha, double_sided, is_unlit, projection: None })
 }
 
 /// Equal for draws that look alike. Opaque ones come first: they hide what is behind them at the
 /// least cost.
-fn sort_key(draw: &Draw) -> (u8, u32, DrawPicture, [u8; 2], bool) {
+fn sort_key(draw: &Draw) -> (u8, u32, DrawPicture, [u8; 2], [bool; 2]) {
     let (kind, cutoff) = match draw.alpha {
         Alpha::Opaque => (0, 0.0f32),
         Alpha::Mask { cutoff } => (1, cutoff),
@@ -147,5 +151,5 @@ fn sort_key(draw: &Draw) -> (u8, u32, DrawPicture, [u8; 2], bool) {
         Wrap::Mirror => 1,
         Wrap::Clamp => 2,
     });
-    (kind, cutoff.to_bits(), draw.picture, wrap, draw.double_sided)
+    (kind, cutoff.to_bits(), draw.picture, wrap, [draw.double_sided, draw.is_unlit])
 }

@@ -226,3 +226,21 @@ fn a_picture_that_the_scene_lacks_is_named() {
     let error = Content::from_mesh(Path::new(FILE), &mesh(), |_| None).unwrap_err().to_string();
     assert!(error.contains(FILE) && error.contains("brick.jpg"), "{error}");
 }
+
+#[test]
+fn unlit_surfaces_are_draws_of_their_own() {
+    let unlit = Surface { is_unlit: true, ..surface(None) };
+    let mesh = NodeMesh {
+        primitives: vec![
+            square(0.0, surface(None)),
+            square(1.0, unlit.clone()),
+            square(2.0, surface(None)),
+            square(3.0, unlit),
+        ],
+        images: Vec::new(),
+        ..mesh()
+    };
+    let (_, _, draws) = draw::assemble(&mesh.primitives, &[]).unwrap();
+    let found: Vec<_> = draws.iter().map(|draw| (draw.is_unlit, draw.indices.len())).collect();
+    assert_eq!(found, [(false, 12), (true, 12)]);
+}
