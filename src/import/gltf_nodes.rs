@@ -54,8 +54,8 @@ impl InstanceAccessors {
 }
 
 /// All placed meshes of the default scene (the first where none is default or the default is not
-/// there; every node where there is no scene), in the order of the hierarchy. The file's CESIUM_RTC moves all of them; nodes that
-/// KHR_node_visibility hides, and those below, are left out.
+/// there; every node where there is no scene), in the order of the hierarchy. The file's CESIUM_RTC
+/// moves all of them; nodes that KHR_node_visibility hides, and those below, are left out.
 pub(super) fn placements(json: &Value) -> Result<Vec<Placement>, String> {
     let nodes = json["nodes"].as_array().map_or(&[][..], Vec::as_slice);
     let children_of = |node: &Value| indices(&node["children"]);

@@ -1,10 +1,11 @@
 //! MTL: material libraries of OBJ.
 //!
-//! Of its statements `Kd`, `d`, `Tr`, `map_Kd` and `map_d` (or `map_opacity`, as OpenSceneGraph calls
-//! it) matter here; one that cannot be read costs no other. The first definition of a name counts, in
-//! one library and in several: of several libraries the format has the first searched first, and
-//! tinyobjloader does the same within each; Blender and assimp take the last. The alpha channel of a `map_Kd` counts where `map_d` names the same file or `d`
-//! is below 1, as in three.js; Blender and obj2gltf ignore it without a `map_d` too.
+//! Of its statements `Kd`, `d`, `Tr`, `map_Kd` and `map_d` (or `map_opacity`, as OpenSceneGraph
+//! calls it) matter here; one that cannot be read costs no other. The first definition of a name
+//! counts, in one library and in several: of several libraries the format has the first searched
+//! first, and tinyobjloader does the same within each; Blender takes the last. The alpha channel of
+//! a `map_Kd` counts where `map_d` names the same file or `d` is below 1, as in three.js; Blender
+//! and obj2gltf ignore it without a `map_d` too.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

@@ -133,8 +133,8 @@ impl<'a> TextureCache<'a> {
         (State::Decoded(Arc::new(Decoded::new(image))), findings)
     }
 
-    /// One warning for each image that could not be decoded or is cut short, and for each of an OBJ whose alpha
-    /// channel no material uses, in the model's order.
+    /// One warning for each image that could not be decoded or is cut short, and for each of an OBJ
+    /// whose alpha channel no material uses, in the model's order.
     pub fn warnings(&self) -> Warnings {
         let mut warnings = Warnings::default();
         for (slot, source) in self.slots.iter().zip(&self.model.textures) {
