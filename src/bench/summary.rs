@@ -195,8 +195,8 @@ fn share_above(values: &[f64], limit: f64) -> f64 {
     mean(values.iter().map(|&value| f64::from(u8::from(value > limit))))
 }
 
-/// How far frames are from the leaves: those that were looked at, show the scene and come after
-/// the loading phase. FLIP of the loading phase stands apart.
+/// The difference of frames from the leaves, over those that were looked at, show the scene and come
+/// after the loading phase. FLIP of the loading phase stands apart.
 fn accuracy(frames: &[FrameRecord], reference: &ReferenceContext) -> Value {
     // Frames that were looked at for what changed in them are no fair part of all.
     let every = usize::try_from(reference.every).unwrap_or(usize::MAX).max(1);
