@@ -4,14 +4,15 @@ use std::time::Duration;
 
 use crate::stage_timer::StageTimer;
 
-/// Work of sixteen times the size takes at most so many times as long. Linear work takes 16 times,
-/// n log n about 20, quadratic 256; caches and noise take their part.
-const MOST: u32 = 48;
+/// Sizes in units of the smallest, and how many times as long their work takes, at most. Linear work
+/// takes 4 and 16 times as long, n log n about 5 and 20, quadratic 16 and 256; caches and noise take
+/// their part.
+const MOST: [(usize, u32); 2] = [(4, 9), (16, 48)];
 
 /// What is shorter than this is not told apart from noise.
 const LEAST: Duration = Duration::from_millis(1);
 
-/// Runs `work` on what `prepare` makes of a size and of sixteen times that, and compares the
+/// Runs `work` on what `prepare` makes of a size, of four and of sixteen times that, and compares the
 /// processor time. Work that grows too fast does so every time; what the machine adds does not.
 pub fn assert_scales<I, O>(size: usize, prepare: impl Fn(usize) -> I, work: impl Fn(I) -> O) {
     let time = |size: usize| {
@@ -22,11 +23,12 @@ pub fn assert_scales<I, O>(size: usize, prepare: impl Fn(usize) -> I, work: impl
     };
     let mut found = Vec::new();
     for _ in 0..3 {
-        let (small, large) = (time(size).max(LEAST), time(16 * size));
-        if large <= MOST * small {
+        let smallest = time(size).max(LEAST);
+        let larger = MOST.map(|(times, most)| (time(times * size), most * smallest));
+        if larger.iter().all(|(time, most)| time <= most) {
             return;
         }
-        found.push((small, large));
+        found.push((smallest, larger.map(|(time, _)| time)));
     }
-    panic!("{size} and {} take {found:?}", 16 * size);
+    panic!("{size} and {:?} times that take {found:?}", MOST.map(|(times, _)| times));
 }

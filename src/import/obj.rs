@@ -618,6 +618,7 @@ impl<'a> Obj<'a> {
             .collect();
         let encoding = self.encoding();
         let file = self.path.display();
+        let mut is_plain = vec![false; self.materials.len()];
         for index in undefined {
             let used = &mut self.materials[index as usize];
             let mut made = self.library.material(
@@ -651,10 +652,10 @@ impl<'a> Obj<'a> {
                     used.material.material.name = name;
                 }
             }
-            if used.material.material.texture.is_none() {
-                let of_material = |state: &&mut PartState| state.part.material == index;
-                self.parts.iter_mut().filter(of_material).for_each(|state| state.bare_faces = 0);
-            }
+            is_plain[index as usize] = used.material.material.texture.is_none();
+        }
+        for state in self.parts.iter_mut().filter(|state| is_plain[state.part.material as usize]) {
+            state.bare_faces = 0;
         }
         self.warn_of_redefinitions();
         if has_colors {

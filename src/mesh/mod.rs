@@ -4,6 +4,7 @@
 pub mod box_tree;
 mod coordinate;
 mod disjoint_set;
+mod ears;
 mod material;
 mod model;
 mod near;

@@ -3,10 +3,18 @@
 //! Ear clipping (earcut) in the plane of the polygon's Newell normal. earcut leaves out corners on a
 //! straight line; here they are put back by dividing the triangle on whose edge they lie, because
 //! the neighbouring face has a corner there as well and the surface would crack.
+//!
+//! earcut takes quadratic time for some rings, and makes one fan of a convex one. A ring of many
+//! corners is first reduced by [`clip_ears`].
 
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
+
+use super::ears::clip_ears;
+
+/// Corners of a ring for earcut, at most.
+const MOST_CORNERS: usize = 80;
 
 /// Turns polygons into triangles; keeps its buffers from one polygon to the next.
 #[derive(Default)]
@@ -54,21 +62,34 @@ impl Triangulator {
         if !flatten(positions, &mut self.flat) {
             return;
         }
+        if self.ring.len() > MOST_CORNERS {
+            self.reduce();
+        }
         let earcut = self.earcut.get_or_insert_with(earcut::Earcut::new);
         earcut.earcut(self.flat.iter().copied(), &[] as &[u32], &mut self.clipped);
         let position = |at: u32| DVec2::from(self.flat[at as usize]);
         // The ring is counter-clockwise in the plane, and so shall be its triangles.
-        self.triangles.extend(self.clipped.as_chunks::<3>().0.iter().map(|&[a, b, c]| {
+        let wound = |&[a, b, c]: &[u32; 3]| {
             let turned = (position(b) - position(a)).perp_dot(position(c) - position(a)) < 0.0;
             if turned { [a, c, b] } else { [a, b, c] }
-        }));
+        };
+        let mut triangles: Vec<[u32; 3]> = self.clipped.as_chunks().0.iter().map(wound).collect();
         // A ring of n corners has n − 2 triangles; fewer, and a corner was left out somewhere.
-        if self.triangles.len() + 2 < self.ring.len() {
-            restore_corners(&self.flat, &mut self.triangles);
+        if triangles.len() + 2 < self.ring.len() {
+            restore_corners(&self.flat, &mut triangles);
         }
+        let of_caller = |triangle: [u32; 3]| triangle.map(|corner| self.ring[corner as usize]);
+        self.triangles.extend(triangles.into_iter().map(of_caller));
+    }
+
+    /// Clips ears off the ring until earcut may have it.
+    fn reduce(&mut self) {
+        let left = clip_ears(&self.flat, MOST_CORNERS, &mut self.triangles);
         for corner in self.triangles.as_flattened_mut() {
             *corner = self.ring[*corner as usize];
         }
+        self.flat = left.iter().map(|&corner| self.flat[corner as usize]).collect();
+        self.ring = left.iter().map(|&corner| self.ring[corner as usize]).collect();
     }
 }
 
@@ -194,6 +215,7 @@ const STRAIGHT: f64 = 1e-9;
 mod tests {
     use super::*;
     use crate::random::Random;
+    use crate::scaling::assert_scales;
 
     /// Twice the vector area.
     fn area(corners: &[[f64; 3]], ring: &[u32]) -> DVec3 {
@@ -338,6 +360,118 @@ mod tests {
         assert_eq!(count(&[[0., 0.], [1., 0.], [2., 0.], [3., 0.], [1.5, 0.]]), 0);
         assert_eq!(count(&[[0., 0.], [0., 0.], [0., 0.], [0., 0.]]), 0);
         assert_eq!(count(&[[0., 0.], [1., 1.], [0., 0.], [1., 1.]]), 0);
+    }
+
+    /// A ring of `count` corners at these distances from its middle.
+    fn star(count: usize, distance: impl Fn(usize) -> f64) -> Vec<[f64; 2]> {
+        let corner = |at: usize| {
+            let (sin, cos) = (at as f64 / count as f64 * std::f64::consts::TAU).sin_cos();
+            [distance(at) * cos, distance(at) * sin]
+        };
+        (0..count).map(corner).collect()
+    }
+
+    /// A corridor that winds inwards, as wide as the walls are apart.
+    fn spiral(count: usize) -> Vec<[f64; 2]> {
+        let wall = |at: usize, beside: f64| {
+            let (sin, cos) = (at as f64 * 0.1).sin_cos();
+            let distance = 10.0 + at as f64 * 0.1 + beside;
+            [distance * cos, distance * sin]
+        };
+        let half = count / 2;
+        let outer = (0..half).map(|at| wall(at, 2.0));
+        outer.chain((0..half).rev().map(|at| wall(at, 0.0))).collect()
+    }
+
+    /// Slanted teeth along a line.
+    fn comb(count: usize) -> Vec<[f64; 2]> {
+        let tooth = |at: usize| [at as f64, 0.0].map(|x| x + (at % 2 * count) as f64);
+        let mut ring: Vec<[f64; 2]> = (0..count - 1).map(tooth).collect();
+        ring.push([count as f64 / 2.0, -1.0]);
+        ring
+    }
+
+    /// A square with corners along its sides.
+    fn square(count: usize) -> Vec<[f64; 2]> {
+        let side = count / 4;
+        let corner = |at: usize| {
+            let along = (at % side) as f64;
+            let back = side as f64 - along;
+            let side = side as f64;
+            [[along, 0.0], [side, along], [back, side], [0.0, back]][at / side as usize]
+        };
+        (0..4 * side).map(corner).collect()
+    }
+
+    /// A square around a row of square holes, each reached by a slit from the bottom.
+    fn keyholes(count: usize) -> Vec<[f64; 2]> {
+        let holes = count / 6;
+        let mut ring = Vec::new();
+        for hole in 0..holes {
+            let x = hole as f64 * 2.0 + 1.0;
+            ring.extend([[x, 0.0], [x, 1.0], [x, 2.0], [x + 1.0, 2.0], [x + 1.0, 1.0], [x, 1.0]]);
+            ring.push([x, 0.0]);
+        }
+        let width = holes as f64 * 2.0 + 1.0;
+        ring.extend([[width, 0.0], [width, 3.0], [0.0, 3.0], [0.0, 0.0]]);
+        ring
+    }
+
+    /// As files have them.
+    fn rounded(ring: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+        ring.into_iter().map(|at| at.map(|part| (part * 1e3).round() / 1e3)).collect()
+    }
+
+    /// Rings by the number of their corners.
+    const RINGS: [(&str, fn(usize) -> Vec<[f64; 2]>); 7] = [
+        ("convex", |count| star(count, |_| 100.0)),
+        ("nearly convex", |count| rounded(star(count, |_| 1000.0))),
+        ("star", |count| star(count, |at| if at % 2 == 0 { 100.0 } else { 50.0 })),
+        ("spiral", spiral),
+        ("comb", comb),
+        ("square", square),
+        ("keyholes", keyholes),
+    ];
+
+    #[test]
+    fn rings_of_many_corners_keep_area_and_use_each_corner() {
+        for (name, ring) in RINGS {
+            let ring = flat(&ring(2000));
+            let triangles = Triangulator::default().triangulate(&ring).to_vec();
+            let whole = area(&ring, &(0..ring.len() as u32).collect::<Vec<_>>());
+            let areas = triangles.iter().map(|triangle| area(&ring, triangle));
+            let sums = areas
+                .fold((DVec3::ZERO, 0.0), |(sum, total), area| (sum + area, total + area.length()));
+            assert!((sums.0 - whole).length() <= 1e-9 * whole.length(), "{name}: {}", sums.0);
+            assert!((sums.1 - whole.length()).abs() <= 1e-9 * whole.length(), "{name}: {}", sums.1);
+            assert_eq!(triangles.len(), ring.len() - 2, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_convex_ring_is_no_fan() {
+        let ring = flat(&star(4096, |_| 100.0));
+        let mut uses = vec![0; ring.len()];
+        let mut triangulator = Triangulator::default();
+        for &corner in triangulator.triangulate(&ring).as_flattened() {
+            uses[corner as usize] += 1;
+        }
+        assert!(uses.into_iter().max() < Some(MOST_CORNERS + 20));
+    }
+
+    #[test]
+    fn time_scales_with_the_corners_of_a_ring() {
+        let soup = |count: usize| {
+            let mut random = Random::new(3, 0);
+            (0..count).map(|_| [0; 2].map(|_| random.between(0.0, 100.0))).collect()
+        };
+        for ring in RINGS.into_iter().map(|(_, ring)| ring).chain([soup as fn(usize) -> _]) {
+            assert_scales(
+                1000,
+                |size| flat(&ring(size)),
+                |ring| Triangulator::default().triangulate(&ring).len(),
+            );
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ use super::*;
 use crate::color::{linear_to_byte, srgb_to_linear, unorm16};
 use crate::mesh::Wrap;
 use crate::random::Random;
+use crate::scaling::assert_scales;
 
 /// Reads `obj` as `city.obj` from a folder that also holds `files`.
 fn read(obj: impl AsRef<[u8]>, files: &[(&str, &str)]) -> Result<Model> {
@@ -938,5 +939,26 @@ fn the_first_definition_of_a_material_counts_in_one_library_and_in_several() {
         assert_eq!(found.as_ref().map(|(_, times)| *times), times, "{obj}");
         assert!(found.is_none_or(|(text, _)| text.ends_with("(first: m)")));
         check_chunks(&folder, obj.as_bytes());
+    }
+}
+
+#[test]
+fn time_scales_with_the_number_of_undefined_materials() {
+    use std::fmt::Write;
+    let folder = folder_with(&[]);
+    let unused = |count: usize| {
+        let mut obj = String::from("v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+        (0..count).for_each(|number| writeln!(obj, "usemtl m{number}").unwrap());
+        obj + "f 1 2 3\n"
+    };
+    let used = |count: usize| {
+        let mut obj = String::from("v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+        (0..count).for_each(|number| writeln!(obj, "usemtl m{number}\nf 1 2 3").unwrap());
+        obj
+    };
+    for obj in [unused, used] {
+        assert_scales(1000, obj, |obj| {
+            read_in_chunks(&folder, obj.as_bytes(), CHUNK_BYTES).unwrap().materials.len()
+        });
     }
 }

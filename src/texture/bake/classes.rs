@@ -1,5 +1,7 @@
 //! Which materials may lose their seams, and which of them look alike.
 
+use std::collections::BTreeMap;
+
 use crate::mesh::{AlphaMode, Material};
 
 /// Materials whose triangles may share a baked texture, by class: all of one class differ in
@@ -14,17 +16,18 @@ impl BakeClasses {
     /// The classes of those opaque `materials` for whose texture `is_cut_up` says yes. Cut-outs
     /// stay with their own texture, as a hole has no nearest point, and so do repeating ones.
     pub fn new(materials: &[Material], is_cut_up: impl Fn(u32) -> bool) -> Self {
-        let alike = |a: &Material, b: &Material| {
-            a.base_color == b.base_color && a.double_sided == b.double_sided
+        // Zeros of either sign are one colour.
+        let look = |material: &Material| {
+            (material.base_color.map(|part| (part + 0.0).to_bits()), material.double_sided)
         };
-        let mut first: Vec<Option<u32>> = Vec::with_capacity(materials.len());
-        for (number, material) in materials.iter().enumerate() {
-            let bakes = material.alpha == AlphaMode::Opaque && is_cut_up(number as u32);
-            let same = (0..number).find(|&other| {
-                first[other] == Some(other as u32) && alike(&materials[other], material)
-            });
-            first.push(bakes.then_some(same.unwrap_or(number) as u32));
-        }
+        let mut first_of_look = BTreeMap::new();
+        let first = (0..)
+            .zip(materials)
+            .map(|(number, material)| {
+                let bakes = material.alpha == AlphaMode::Opaque && is_cut_up(number);
+                bakes.then(|| *first_of_look.entry(look(material)).or_insert(number))
+            })
+            .collect();
         Self { first }
     }
 
@@ -42,6 +45,7 @@ impl BakeClasses {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scaling::assert_scales;
 
     #[test]
     fn opaque_materials_of_one_colour_are_one_class() {
@@ -52,5 +56,17 @@ mod tests {
         let classes = BakeClasses::new(&materials, |material| material != 3);
         let of: Vec<_> = (0..6).map(|material| classes.of(material)).collect();
         assert_eq!(of, [None, Some(1), Some(2), None, Some(1), None]);
+    }
+
+    #[test]
+    fn time_scales_with_the_number_of_colours() {
+        let material = |number: usize| Material {
+            base_color: [0.0, 0.25, 0.5, (number % (1 << 20)) as f32 / (1 << 20) as f32],
+            ..Material::plain(number.to_string())
+        };
+        let materials = |count: usize| (0..count).map(material).collect::<Vec<_>>();
+        for bakes in [false, true] {
+            assert_scales(1000, materials, |materials| BakeClasses::new(&materials, |_| bakes));
+        }
     }
 }
