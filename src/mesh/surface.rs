@@ -10,9 +10,6 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec3, Vec3, Vec3A};
-use obvhs::BvhBuildParams;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::builder::build_bvh2;
 use rayon::prelude::*;
 
 use crate::stage_timer::StageTimer;
@@ -33,6 +30,9 @@ const ENOUGH: f64 = -1.0;
 
 /// Triangles of one hierarchy, at most.
 const MOST_TRIANGLES: usize = 1 << 20;
+
+/// Triangles of a leaf of a hierarchy, at most.
+const LEAF: usize = 4;
 
 /// A triangle mesh that can be asked for its closest point.
 pub(crate) struct Surface {
@@ -58,6 +58,7 @@ struct Part {
 }
 
 /// A node of a hierarchy, in 32 bytes.
+#[derive(Clone, Copy, Default)]
 struct BvhNode {
     low: Vec3,
     /// Triangles; 0 where it has nodes below it.
@@ -254,6 +255,50 @@ fn divide(
     divide(others, positions, triangles, most, parts);
 }
 
+/// A triangle's box while a hierarchy is built.
+struct BoxedTriangle {
+    number: u32,
+    low: Vec3,
+    high: Vec3,
+}
+
+impl BoxedTriangle {
+    fn new(number: u32, [a, b, c]: [Vec3; 3]) -> Self {
+        Self { number, low: a.min(b).min(c), high: a.max(b).max(c) }
+    }
+
+    /// Twice the centre of its box.
+    fn centre(&self) -> Vec3 {
+        self.low + self.high
+    }
+}
+
+/// Builds the hierarchy of `boxes`, whose first is number `first` of all, below node `at`. Halves
+/// them at the median of the longest side that their centres span, so that counts alone bound the
+/// depth, wherever the boxes are.
+fn build(nodes: &mut Vec<BvhNode>, at: usize, boxes: &mut [BoxedTriangle], first: usize) {
+    let low = boxes.iter().fold(Vec3::INFINITY, |low, boxed| low.min(boxed.low));
+    let high = boxes.iter().fold(Vec3::NEG_INFINITY, |high, boxed| high.max(boxed.high));
+    if boxes.len() <= LEAF {
+        nodes[at] = BvhNode { low, count: boxes.len() as u32, high, first: first as u32 };
+        return;
+    }
+    let centres = || boxes.iter().map(BoxedTriangle::centre);
+    let span =
+        centres().fold(Vec3::NEG_INFINITY, Vec3::max) - centres().fold(Vec3::INFINITY, Vec3::min);
+    let axis = span.max_position();
+    let middle = boxes.len() / 2;
+    boxes.select_nth_unstable_by(middle, |a, b| {
+        a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.number.cmp(&b.number))
+    });
+    let child = nodes.len();
+    nodes.extend([BvhNode::default(); 2]);
+    nodes[at] = BvhNode { low, count: 0, high, first: child as u32 };
+    let (lower, upper) = boxes.split_at_mut(middle);
+    build(nodes, child, lower, first);
+    build(nodes, child + 1, upper, first + middle);
+}
+
 impl Part {
     fn new(positions: &[DVec3], triangles: &[[u32; 3]], members: Vec<u32>) -> Self {
         let corners = |number: u32| triangles[number as usize].map(|v| positions[v as usize]);
@@ -261,19 +306,12 @@ impl Part {
         let low = all().fold(DVec3::INFINITY, DVec3::min);
         let high = all().fold(DVec3::NEG_INFINITY, DVec3::max);
         let centre = (low + high) * 0.5;
-        let boxes: Vec<Aabb> = members
-            .iter()
-            .map(|&number| Aabb::from_points(&corners(number).map(|p| (p - centre).as_vec3a())))
-            .collect();
-        let bvh = build_bvh2(&boxes, BvhBuildParams::very_fast_build(), &mut Default::default());
-        let node = |node: &obvhs::bvh2::node::Bvh2Node| BvhNode {
-            low: node.aabb.min.into(),
-            count: node.prim_count,
-            high: node.aabb.max.into(),
-            first: node.first_index,
-        };
-        let nodes = bvh.nodes.iter().map(node).collect();
-        let members = bvh.primitive_indices.iter().map(|&at| members[at as usize]).collect();
+        let local = |number: u32| corners(number).map(|p| (p - centre).as_vec3());
+        let boxed = |&number: &u32| BoxedTriangle::new(number, local(number));
+        let mut boxes: Vec<BoxedTriangle> = members.iter().map(boxed).collect();
+        let mut nodes = vec![BvhNode::default()];
+        build(&mut nodes, 0, &mut boxes, 0);
+        let members = boxes.iter().map(|boxed| boxed.number).collect();
         Self { nodes, members, low, high, slack: (high - low).max_element() * BOX_SLACK }
     }
 
@@ -281,14 +319,13 @@ impl Part {
         let centre = (self.low + self.high) * 0.5;
         let slack =
             self.slack + (low - centre).abs().max(high - centre).abs().max_element() * BOX_SLACK;
-        let wanted =
-            Aabb::new((low - centre - slack).as_vec3a(), (high - centre + slack).as_vec3a());
+        let wanted = [(low - centre - slack).as_vec3a(), (high - centre + slack).as_vec3a()];
         let mut stack = Vec::with_capacity(64);
         stack.push(0u32);
         while let Some(number) = stack.pop() {
             let node = &self.nodes[number as usize];
             let (low, high) = (Vec3A::from(node.low), Vec3A::from(node.high));
-            if low.cmpgt(wanted.max).any() || high.cmplt(wanted.min).any() {
+            if low.cmpgt(wanted[1]).any() || high.cmplt(wanted[0]).any() {
                 continue;
             }
             match node.count {
@@ -402,6 +439,7 @@ fn nearest_weights(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
 mod tests {
     use super::*;
     use crate::random::Random;
+    use crate::scaling::assert_scales;
 
     /// The nearest point by brute force: the projection where it is inside, else of the sides.
     fn naive(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
@@ -538,6 +576,16 @@ mod tests {
             };
             assert_eq!(in_box(&parts), in_box(&whole));
         }
+    }
+
+    #[test]
+    fn coincident_triangles_make_no_deep_hierarchy() {
+        let triangles = |count: usize| vec![[0, 1, 2]; count];
+        let positions = || vec![DVec3::ZERO, DVec3::X, DVec3::Y];
+        assert_scales(1000, triangles, |triangles| {
+            let surface = Surface::new(positions(), triangles);
+            assert_eq!(surface.distance(DVec3::Z), 1.0);
+        });
     }
 
     #[test]

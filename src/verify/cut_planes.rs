@@ -16,6 +16,7 @@ use super::seams::Seam;
 use super::tree::{apart, input_of, is_leaf, leaves, line};
 use crate::format::{Node, Scene};
 use crate::mesh::NEAR;
+use crate::mesh::box_tree::{BoxTree, Corners};
 
 /// How far a triangle in a cutting plane may be from it, as a share of its longest edge. A border
 /// vertex may lie beside the plane by a hundredth of the edge that was not split there.
@@ -94,11 +95,29 @@ fn touching_leaves(scene: &Scene, axis: usize) -> Vec<([u32; 2], [f64; 2])> {
         let is_cut = node(a).bbox_max[axis] == node(b).bbox_min[axis];
         (0..3).all(overlap) && (is_cut || input_of(scene, a) != input_of(scene, b))
     };
+    // The sides at which they begin.
+    let side = |&leaf: &u32| {
+        let (mut low, mut high) = (node(leaf).bbox_min, node(leaf).bbox_max);
+        (low[axis], high[axis]) = (begins(leaf), begins(leaf));
+        [low, high]
+    };
+    let sides = BoxTree::new(leaves.iter().map(side).collect());
     let beside = |&a: &u32| {
         let end = node(a).bbox_max[axis] + 0.0;
-        let first = leaves.partition_point(|&b| begins(b) < end - NEAR);
-        let others = leaves[first..].iter().take_while(move |&&b| begins(b) <= end + NEAR);
-        others.filter(|&&b| meet(a, b)).map(|&b| ([a, b], [end, begins(b)])).collect::<Vec<_>>()
+        let range = |at: usize| match at == axis {
+            true => [end, end],
+            false => [node(a).bbox_min[at], node(a).bbox_max[at]],
+        };
+        let touches = |bounds: &Corners| {
+            (0..3).all(|at| {
+                let [low, high] = range(at);
+                low - NEAR <= bounds[1][at] && bounds[0][at] - NEAR <= high
+            })
+        };
+        let mut found: Vec<usize> = sides.matching(touches).collect();
+        found.sort_unstable();
+        let others = found.into_iter().map(|number| leaves[number]).filter(|&b| meet(a, b));
+        others.map(|b| ([a, b], [end, begins(b)])).collect::<Vec<_>>()
     };
     leaves.par_iter().flat_map_iter(beside).collect()
 }
@@ -153,6 +172,7 @@ mod tests {
     use super::*;
     use crate::format::BlockInfo;
     use crate::format::test_scene::scene;
+    use crate::scaling::assert_scales;
 
     #[test]
     fn the_plane_is_found_beside_other_coordinates_that_edges_share() {
@@ -174,6 +194,25 @@ mod tests {
         assert_eq!(found, Some((0, [5f64.to_bits(); 2])), "not z = 0, where all is");
         let beside = seam([5.01, 0.0, 0.0], [5.02, 4.0, 1.0]);
         assert_eq!(plane_between(&[&beside], [&flat[0], &flat[1]], 1e-6), None);
+    }
+
+    /// Leaves in one square layer, side by side.
+    #[test]
+    fn time_scales_with_the_leaves_that_begin_in_a_plane() {
+        let layer = |count: usize| {
+            let leaf = |number: usize| Node {
+                parent: None,
+                first_child: None,
+                next_sibling: None,
+                bbox_min: [(number % 2) as f64, (number / 2) as f64, 0.0],
+                bbox_max: [(number % 2 + 1) as f64, (number / 2 + 1) as f64, 1.0],
+                ..scene().nodes[0].clone()
+            };
+            Scene { nodes: (0..count).map(leaf).collect(), ..scene() }
+        };
+        assert_scales(1000, layer, |scene| {
+            assert!(touching_leaves(&scene, 0).len() >= scene.nodes.len() / 2);
+        });
     }
 
     /// Two coarse nodes, 1 and 2, with a leaf each, 3 and 4, apart at x = 5.

@@ -100,7 +100,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         child_path: &[u32],
         wanted: bool,
     ) -> Result<Built<S::Record>> {
-        let NodePlan::Coarse { resolution, budget } = plan else {
+        let NodePlan::Coarse { resolution, budget, share } = plan else {
             return self.leaf(chunk, child_path, wanted);
         };
         let path = chunk.path.clone();
@@ -108,9 +108,11 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let mesh = chunk.mesh.clone();
         let stitches = chunk.stitches.clone();
         let (border, moved) = (chunk.border.clone(), self.moved(&chunk));
-        let parent = Parent { resolution, triangles: mesh.triangles.len() };
-        let parallel = parent.triangles > PARALLEL * self.options.desired_tris as usize;
+        let parallel = mesh.triangles.len() > PARALLEL * self.options.desired_tris as usize;
         let chunks = self.stages.time(Stage::Cut, || self.divide(chunk, resolution));
+        let of_children = chunks.iter().map(|chunk| chunk.mesh.triangles.len()).sum();
+        let triangles = mesh.triangles.len();
+        let parent = Parent { resolution, triangles, share, of_children };
         // What no plane divides would not be divided by the next ones either.
         let divided = chunks.len() > 1 || self.options.tree == TreeShape::Thesis;
         let children: Vec<(Chunk, NodePlan)> = chunks

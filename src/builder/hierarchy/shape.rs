@@ -17,6 +17,11 @@ use crate::builder::constants::TreeConstants;
 /// holds 64, and each child is behind at most 6 more).
 const MOST_PLANES: usize = 58;
 
+/// A chunk is divided while cuts have made at most so many triangles of each of the block's that it
+/// has. Pieces of a surface stay near 1; of long triangles that overlap each cut makes two of most,
+/// and n of them would become n^(5/3).
+const MOST_PIECES: f64 = 3.0;
+
 /// The resolutions of one block.
 #[derive(Clone, Debug)]
 pub struct Resolutions {
@@ -39,6 +44,9 @@ pub enum NodePlan {
         resolution: usize,
         /// The triangles that it may have.
         budget: usize,
+        /// The chunk's share of the block's triangles, in proportion to those that cuts have made of
+        /// them.
+        share: usize,
     },
 }
 
@@ -49,6 +57,10 @@ pub struct Parent {
     pub resolution: usize,
     /// The source triangles of its chunk.
     pub triangles: usize,
+    /// See [`NodePlan::Coarse`].
+    pub share: usize,
+    /// The triangles of all its children.
+    pub of_children: usize,
 }
 
 impl Resolutions {
@@ -95,26 +107,32 @@ impl Resolutions {
 
     /// What becomes of the whole block.
     pub fn root(&self, triangles: usize) -> NodePlan {
-        if self.last() == 0 { NodePlan::Leaf } else { self.coarse(triangles, 0) }
+        if self.last() == 0 { NodePlan::Leaf } else { self.coarse(triangles, 0, triangles) }
     }
 
     /// What becomes of a chunk of so many triangles, behind so many planes, below a node.
     pub fn child(&self, triangles: usize, planes: usize, parent: Parent) -> NodePlan {
         let next = parent.resolution + 1;
+        let part = triangles as f64 / parent.of_children.max(1) as f64;
+        let share = parent.share as f64 * part;
         if self.tree == TreeShape::Thesis {
             let deep = next == self.last() || planes > MOST_PLANES;
-            return if deep { NodePlan::Leaf } else { self.coarse(triangles, next) };
+            let share = share.round() as usize;
+            return if deep { NodePlan::Leaf } else { self.coarse(triangles, next, share) };
         }
         let ratio = triangles as f64 / self.desired_tris;
-        if steps(ratio, self.level_factor) <= 0 || planes > MOST_PLANES {
+        let in_pieces = triangles as f64 > MOST_PIECES * share;
+        if steps(ratio, self.level_factor) <= 0 || planes > MOST_PLANES || in_pieces {
             return NodePlan::Leaf;
         }
+        let share = share.round() as usize;
         if next >= self.last() {
             let most = self.constants.last_step_tolerance * self.level_factor.sqrt();
             let shrunk =
                 parent.triangles as f64 / libm::pow(self.level_factor, self.constants.shrinking);
             let leaf = ratio < most || triangles as f64 > shrunk;
-            return if leaf { NodePlan::Leaf } else { self.coarse(triangles, parent.resolution) };
+            let coarse = || self.coarse(triangles, parent.resolution, share);
+            return if leaf { NodePlan::Leaf } else { coarse() };
         }
         // The coarsest resolution that gives the node about the triangles that are desired.
         let nearest = (next..self.last()).min_by(|&a, &b| {
@@ -124,12 +142,12 @@ impl Resolutions {
             };
             off(a).total_cmp(&off(b))
         });
-        self.coarse(triangles, nearest.unwrap_or(next))
+        self.coarse(triangles, nearest.unwrap_or(next), share)
     }
 
-    fn coarse(&self, triangles: usize, resolution: usize) -> NodePlan {
+    fn coarse(&self, triangles: usize, resolution: usize, share: usize) -> NodePlan {
         let budget = (triangles as f64 / self.factors[resolution]).round() as usize;
-        NodePlan::Coarse { resolution, budget: budget.max(1) }
+        NodePlan::Coarse { resolution, budget: budget.max(1), share }
     }
 }
 
@@ -196,17 +214,23 @@ mod tests {
     fn chunks_that_fit_are_leaves_and_small_ones_skip_resolutions() {
         let all = resolutions(900 * 256, TreeShape::Balanced);
         assert_eq!(all.factors.len(), 5);
-        let coarse = |resolution, budget| NodePlan::Coarse { resolution, budget };
-        let below = |resolution| Parent { resolution, triangles: (900 * 256) >> (2 * resolution) };
-        assert_eq!(all.root(900 * 256), coarse(0, 900));
-        assert_eq!(all.child(900 * 64, 2, below(0)), coarse(1, 900));
-        assert_eq!(all.child(900 * 4, 2, below(0)), coarse(3, 900));
+        let coarse = |resolution, budget, share| NodePlan::Coarse { resolution, budget, share };
+        let parent = |resolution, triangles| Parent {
+            resolution,
+            triangles,
+            share: triangles,
+            of_children: triangles,
+        };
+        let below = |resolution| parent(resolution, (900 * 256) >> (2 * resolution));
+        assert_eq!(all.root(900 * 256), coarse(0, 900, 900 * 256));
+        assert_eq!(all.child(900 * 64, 2, below(0)), coarse(1, 900, 900 * 64));
+        assert_eq!(all.child(900 * 4, 2, below(0)), coarse(3, 900, 900 * 4));
         for parent in 0..3 {
             assert_eq!(all.child(1700, 2, below(parent)), NodePlan::Leaf);
         }
-        let large = Parent { resolution: 3, triangles: 900 * 16 };
+        let large = parent(3, 900 * 16);
         assert_eq!(all.child(3500, 8, large), NodePlan::Leaf, "a little more than it should have");
-        assert_eq!(all.child(3700, 8, large), coarse(3, 925));
+        assert_eq!(all.child(3700, 8, large), coarse(3, 925, 3700));
         assert_eq!(all.child(900 * 64, 60, below(0)), NodePlan::Leaf, "no plane is left");
     }
 
@@ -220,11 +244,35 @@ mod tests {
         while let NodePlan::Coarse { resolution: at, .. } = all.child(
             (triangles as f64 / 4f64.cbrt()) as usize,
             depth,
-            Parent { resolution, triangles },
+            Parent { resolution, triangles, share: triangles, of_children: triangles },
         ) {
             triangles = (triangles as f64 / 4f64.cbrt()) as usize;
             (resolution, depth) = (at, depth + 1);
         }
         assert!(depth <= 1, "{depth}");
+    }
+
+    /// Each of four children has as many triangles as the whole, or half as many.
+    #[test]
+    fn cuts_make_a_bounded_number_of_pieces() {
+        for part in [1.0, 0.5] {
+            let mut pieces = Vec::new();
+            for triangles in [4, 16, 64].map(|times: usize| times * 9000) {
+                let all = resolutions(triangles, TreeShape::Balanced);
+                let mut nodes = vec![(triangles, all.root(triangles))];
+                let mut in_leaves = 0;
+                while let Some((triangles, plan)) = nodes.pop() {
+                    let NodePlan::Coarse { resolution, share, .. } = plan else {
+                        in_leaves += triangles;
+                        continue;
+                    };
+                    let child = (triangles as f64 * part) as usize;
+                    let parent = Parent { resolution, triangles, share, of_children: 4 * child };
+                    nodes.extend((0..4).map(|_| (child, all.child(child, 2, parent))));
+                }
+                pieces.push(in_leaves as f64 / triangles as f64);
+            }
+            assert!(pieces.iter().all(|&pieces| pieces <= 4.0 * MOST_PIECES), "{pieces:?}");
+        }
     }
 }
