@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 
+use super::OrientedBox;
 use crate::stage_timer::StageTimer;
 
 /// Share of the extent by which a distance to a box may be wrong in f32: that of the point and
@@ -34,6 +35,10 @@ const MOST_TRIANGLES: usize = 1 << 20;
 /// Triangles of a leaf of a hierarchy, at most.
 const LEAF: usize = 4;
 
+/// The boxes of two nodes overlap where their areas sum up to more than so many times that of the box
+/// around both: those of a surface that is divided well have somewhat more than it.
+const OVERLAP: f32 = 1.5;
+
 /// A triangle mesh that can be asked for its closest point.
 pub(crate) struct Surface {
     positions: Vec<DVec3>,
@@ -50,6 +55,8 @@ impl std::fmt::Debug for Surface {
 /// The triangles whose first corner lies in one square, or a part of them.
 struct Part {
     nodes: Vec<BvhNode>,
+    /// By node, the boxes of those that overlap others; empty where none does.
+    oriented: Vec<Option<Box<OrientedBox>>>,
     /// Numbers of the triangles, those of a node side by side.
     members: Vec<u32>,
     low: DVec3,
@@ -255,48 +262,82 @@ fn divide(
     divide(others, positions, triangles, most, parts);
 }
 
-/// A triangle's box while a hierarchy is built.
+/// A triangle while a hierarchy is built.
 struct BoxedTriangle {
     number: u32,
-    low: Vec3,
-    high: Vec3,
+    corners: [Vec3; 3],
 }
 
 impl BoxedTriangle {
-    fn new(number: u32, [a, b, c]: [Vec3; 3]) -> Self {
-        Self { number, low: a.min(b).min(c), high: a.max(b).max(c) }
+    fn low(&self) -> Vec3 {
+        let [a, b, c] = self.corners;
+        a.min(b).min(c)
+    }
+
+    fn high(&self) -> Vec3 {
+        let [a, b, c] = self.corners;
+        a.max(b).max(c)
     }
 
     /// Twice the centre of its box.
     fn centre(&self) -> Vec3 {
-        self.low + self.high
+        self.low() + self.high()
     }
 }
 
-/// Builds the hierarchy of `boxes`, whose first is number `first` of all, below node `at`. Halves
-/// them at the median of the longest side that their centres span, so that counts alone bound the
-/// depth, wherever the boxes are.
-fn build(nodes: &mut Vec<BvhNode>, at: usize, boxes: &mut [BoxedTriangle], first: usize) {
-    let low = boxes.iter().fold(Vec3::INFINITY, |low, boxed| low.min(boxed.low));
-    let high = boxes.iter().fold(Vec3::NEG_INFINITY, |high, boxed| high.max(boxed.high));
-    if boxes.len() <= LEAF {
-        nodes[at] = BvhNode { low, count: boxes.len() as u32, high, first: first as u32 };
-        return;
+/// The nodes of a hierarchy while it is built.
+#[derive(Default)]
+struct Builder {
+    nodes: Vec<BvhNode>,
+    oriented: BTreeMap<usize, OrientedBox>,
+}
+
+impl Builder {
+    /// Builds the hierarchy of `boxes`, whose first is number `first` of all, below node `at`. Halves
+    /// them at the median of the longest side that their centres span, so that counts alone bound the
+    /// depth, wherever the boxes are.
+    fn build(&mut self, at: usize, boxes: &mut [BoxedTriangle], first: usize) {
+        let low = boxes.iter().fold(Vec3::INFINITY, |low, boxed| low.min(boxed.low()));
+        let high = boxes.iter().fold(Vec3::NEG_INFINITY, |high, boxed| high.max(boxed.high()));
+        if boxes.len() <= LEAF {
+            self.nodes[at] = BvhNode { low, count: boxes.len() as u32, high, first: first as u32 };
+            return;
+        }
+        let centres = || boxes.iter().map(BoxedTriangle::centre);
+        let span = centres().fold(Vec3::NEG_INFINITY, Vec3::max)
+            - centres().fold(Vec3::INFINITY, Vec3::min);
+        let axis = span.max_position();
+        let middle = boxes.len() / 2;
+        boxes.select_nth_unstable_by(middle, |a, b| {
+            a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.number.cmp(&b.number))
+        });
+        let child = self.nodes.len();
+        self.nodes.extend([BvhNode::default(); 2]);
+        self.nodes[at] = BvhNode { low, count: 0, high, first: child as u32 };
+        let (lower, upper) = boxes.split_at_mut(middle);
+        self.build(child, lower, first);
+        self.build(child + 1, upper, first + middle);
+        let [one, other, both] = [child, child + 1, at].map(|node| self.nodes[node].half_area());
+        if one + other > OVERLAP * both {
+            for (node, boxes) in [(child, lower), (child + 1, upper)] {
+                let around = OrientedBox::around(boxes.iter().map(|boxed| boxed.corners));
+                self.oriented.insert(node, around);
+            }
+        }
     }
-    let centres = || boxes.iter().map(BoxedTriangle::centre);
-    let span =
-        centres().fold(Vec3::NEG_INFINITY, Vec3::max) - centres().fold(Vec3::INFINITY, Vec3::min);
-    let axis = span.max_position();
-    let middle = boxes.len() / 2;
-    boxes.select_nth_unstable_by(middle, |a, b| {
-        a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.number.cmp(&b.number))
-    });
-    let child = nodes.len();
-    nodes.extend([BvhNode::default(); 2]);
-    nodes[at] = BvhNode { low, count: 0, high, first: child as u32 };
-    let (lower, upper) = boxes.split_at_mut(middle);
-    build(nodes, child, lower, first);
-    build(nodes, child + 1, upper, first + middle);
+
+    /// By node; empty where there is none.
+    fn oriented(&mut self) -> Vec<Option<Box<OrientedBox>>> {
+        let nodes = if self.oriented.is_empty() { 0 } else { self.nodes.len() };
+        (0..nodes).map(|node| self.oriented.remove(&node).map(Box::new)).collect()
+    }
+}
+
+impl BvhNode {
+    fn half_area(&self) -> f32 {
+        let Vec3 { x, y, z } = self.high - self.low;
+        x * y + y * z + z * x
+    }
 }
 
 impl Part {
@@ -307,12 +348,14 @@ impl Part {
         let high = all().fold(DVec3::NEG_INFINITY, DVec3::max);
         let centre = (low + high) * 0.5;
         let local = |number: u32| corners(number).map(|p| (p - centre).as_vec3());
-        let boxed = |&number: &u32| BoxedTriangle::new(number, local(number));
+        let boxed = |&number: &u32| BoxedTriangle { number, corners: local(number) };
         let mut boxes: Vec<BoxedTriangle> = members.iter().map(boxed).collect();
-        let mut nodes = vec![BvhNode::default()];
-        build(&mut nodes, 0, &mut boxes, 0);
+        let mut builder = Builder { nodes: vec![BvhNode::default()], ..Builder::default() };
+        builder.build(0, &mut boxes, 0);
+        let oriented = builder.oriented();
+        let nodes = builder.nodes;
         let members = boxes.iter().map(|boxed| boxed.number).collect();
-        Self { nodes, members, low, high, slack: (high - low).max_element() * BOX_SLACK }
+        Self { nodes, oriented, members, low, high, slack: (high - low).max_element() * BOX_SLACK }
     }
 
     fn in_box(&self, low: DVec3, high: DVec3, visit: &mut impl FnMut(u32)) {
@@ -352,7 +395,11 @@ impl Part {
         let slack = self.slack + from_centre.abs().max_element() * BOX_SLACK;
         let to_box = |node: u32| {
             let BvhNode { low, high, .. } = self.nodes[node as usize];
-            (local - local.clamp(low.into(), high.into())).length_squared()
+            let squared = (local - local.clamp(low.into(), high.into())).length_squared();
+            match self.oriented.get(node as usize) {
+                Some(Some(oriented)) => squared.max(oriented.squared_distance(local.into())),
+                _ => squared,
+            }
         };
         // Squares, and a last bit more.
         let limit = |reach: f64| ((reach + slack).powi(2) * (1.0 + 1e-6)) as f32;
@@ -576,6 +623,29 @@ mod tests {
             };
             assert_eq!(in_box(&parts), in_box(&whole));
         }
+    }
+
+    /// The boxes along the axes of most slivers hold a point near their common corner.
+    #[test]
+    fn time_scales_with_the_triangles_of_a_fan() {
+        let fan = |count: usize| {
+            let rim = |at: usize| {
+                let (sin, cos) = (at as f64 / count as f64 * std::f64::consts::TAU).sin_cos();
+                DVec3::new(cos, sin, 0.0) * 100.0
+            };
+            let positions: Vec<DVec3> =
+                [DVec3::Z * 10.0].into_iter().chain((0..count).map(rim)).collect();
+            let next = |at: u32| (at + 1) % count as u32;
+            (positions, (0..count as u32).map(|at| [0, at + 1, next(at) + 1]).collect::<Vec<_>>())
+        };
+        assert_scales(1000, fan, |(positions, triangles)| {
+            let mut random = Random::new(2, 0);
+            let surface = Surface::new(positions.clone(), triangles);
+            for _ in 0..positions.len() {
+                let [x, y] = [0; 2].map(|_| random.between(-50.0, 50.0));
+                surface.closest(DVec3::new(x, y, random.between(0.0, 10.0))).unwrap();
+            }
+        });
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::triangle::{LANES, Lanes, Points, Triangle, Triangles, max};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, OrientedBox};
 
 /// What a child is: a node, or with this bit a leaf.
 pub(super) const LEAF: u32 = 1 << 31;
@@ -63,10 +63,6 @@ impl Node {
 const OVERLAP: f32 = 3.0;
 
 /// Eight boxes with axes of their own.
-///
-/// The triangles of a fan are long and thin, and lie across the axes: many axis-aligned boxes overlap, all of
-/// which hold a point near their common corner, and a search would go into each. Boxes along the
-/// triangles are as thin as these (Gottschalk, Lin and Manocha 1996, "OBBTree").
 #[derive(Debug)]
 struct OrientedBoxes {
     origin: Points,
@@ -76,41 +72,19 @@ struct OrientedBoxes {
 }
 
 impl OrientedBoxes {
-    /// Each around triangles, of which there is one at least, along the one with the longest edge.
+    /// One around each group of triangles.
     fn around(groups: &[Vec<[Vec3; 3]>]) -> Self {
-        let longest = |group: &Vec<[Vec3; 3]>| {
-            let squared = |[a, b, c]: [Vec3; 3]| {
-                let ab = a.distance_squared(b);
-                ab.max(b.distance_squared(c)).max(c.distance_squared(a))
-            };
-            let first = group.first().copied().unwrap_or_default();
-            let longer = |a, b| if squared(b) > squared(a) { b } else { a };
-            Triangle::new(group.iter().copied().fold(first, longer))
+        let boxes: Vec<OrientedBox> =
+            groups.iter().map(|group| OrientedBox::around(group.iter().copied())).collect();
+        let of = |lane: usize| boxes.get(lane).copied().unwrap_or(OrientedBox::EMPTY);
+        let extents = |corner: fn(OrientedBox) -> Vec3| -> [Lanes; 3] {
+            std::array::from_fn(|axis| std::array::from_fn(|lane| corner(of(lane))[axis]))
         };
-        let frames: Vec<Triangle> = groups.iter().map(longest).collect();
-        let axes = |lane: usize| {
-            let frame = frames.get(lane);
-            frame.map_or([Vec3::ZERO; 3], |Triangle { along, up, .. }| {
-                [*along, *up, along.cross(*up)]
-            })
-        };
-        let extent = |lane: usize, axis: usize| {
-            let Some(group) = groups.get(lane) else { return [f32::INFINITY, f32::NEG_INFINITY] };
-            let (origin, axis) = (frames[lane].origin, axes(lane)[axis]);
-            let places = group.iter().flatten().map(|&corner| (corner - origin).dot(axis));
-            let (low, high) =
-                places.fold((0f32, 0f32), |(low, high), at| (low.min(at), high.max(at)));
-            let farthest = group.iter().flatten().map(|corner| corner.distance(origin));
-            let slack = ORIENTED_ROUNDING * farthest.fold(0.0, f32::max);
-            [low - slack, high + slack]
-        };
-        let extents: [[[f32; 2]; LANES]; 3] =
-            std::array::from_fn(|axis| std::array::from_fn(|lane| extent(lane, axis)));
         Self {
-            origin: Points::from_fn(|lane| frames.get(lane).map_or(Vec3::ZERO, |at| at.origin)),
-            axes: std::array::from_fn(|axis| Points::from_fn(|lane| axes(lane)[axis])),
-            low: extents.map(|lanes| lanes.map(|[low, _]| low)),
-            high: extents.map(|lanes| lanes.map(|[_, high]| high)),
+            origin: Points::from_fn(|lane| of(lane).origin),
+            axes: std::array::from_fn(|axis| Points::from_fn(|lane| of(lane).axes[axis])),
+            low: extents(|of| of.low),
+            high: extents(|of| of.high),
         }
     }
 
@@ -124,14 +98,11 @@ impl OrientedBoxes {
                 let outside = max(max(self.low[axis][lane] - at, at - self.high[axis][lane]), 0.0);
                 *squared += outside * outside;
             }
-            *squared *= 1.0 - 2.0 * ORIENTED_ROUNDING;
+            *squared *= OrientedBox::LESS;
         }
         squared
     }
 }
-
-/// By what share of itself a coordinate along an axis may be wrong.
-const ORIENTED_ROUNDING: f32 = 16.0 * f32::EPSILON;
 
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug)]
