@@ -194,7 +194,7 @@ fn read<T: serde::de::DeserializeOwned>(parameters: &serde_json::Value, name: &s
     T::deserialize(&parameters[name]).map_err(|error| unknown(name, &error))
 }
 
-/// How a switch is written among the parameters.
+/// Returns the text of a switch among the parameters.
 fn on_off(is_on: bool) -> &'static str {
     if is_on { "on" } else { "off" }
 }

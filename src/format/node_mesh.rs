@@ -24,8 +24,7 @@ pub enum NodeImageData {
         mime: &'static str,
         /// The encoded picture.
         bytes: Vec<u8>,
-        /// Of a repeating texture, the file name that it has where nodes share it; `None` of an
-        /// atlas.
+        /// The file name that a repeating texture has where nodes share it. An atlas has `None`.
         file_name: Option<Arc<str>>,
     },
     /// A repeating texture stored once in [`TEXTURES_DIR`](super::TEXTURES_DIR).

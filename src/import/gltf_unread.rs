@@ -1,5 +1,5 @@
 //! What a glTF file asks for and import does not read, counted by the primitives that it concerns.
-//! What concerns no primitive or the whole file is counted once.
+//! Features that concern no primitive or the whole file are counted once.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! MTL: material libraries of OBJ.
 //!
-//! Of its statements `Kd`, `d`, `Tr`, `map_Kd` and `map_d` (or `map_opacity`, as OpenSceneGraph
-//! calls it) matter here; one that cannot be read costs no other. The first definition of a name
+//! The importer reads `Kd`, `d`, `Tr`, `map_Kd` and `map_d` (or `map_opacity`, as OpenSceneGraph
+//! calls it); one that cannot be read costs no other. The first definition of a name
 //! counts, in one library and in several: of several libraries the format has the first searched
 //! first, and tinyobjloader does the same within each; Blender takes the last. The alpha channel of
 //! a `map_Kd` counts where `map_d` names the same file or `d` is below 1, as in three.js; Blender
@@ -147,10 +147,10 @@ pub(super) struct Library {
     by_bare: BTreeMap<Vec<u8>, usize>,
 }
 
-/// What a library says of one material.
+/// A material as a library defines it.
 struct Entry {
     name: Vec<u8>,
-    /// Of names that are not UTF-8.
+    /// The encoding of names that are not UTF-8.
     encoding: Option<&'static Encoding>,
     statements: Statements,
 }

@@ -133,7 +133,7 @@ const SAMPLE_BYTES: usize = 1 << 16;
 pub(super) struct NameSample {
     /// Names that are not UTF-8, a line each.
     bytes: Vec<u8>,
-    /// How many more names are not UTF-8 than are UTF-8 and not ASCII.
+    /// The number of names that are not UTF-8, less those that are UTF-8 and not ASCII.
     excess: i64,
 }
 

@@ -52,7 +52,7 @@ pub(super) const CHUNK_BYTES: usize = 1 << 18;
 /// Chunks of a batch for each thread: enough to keep all busy when some take longer.
 const CHUNKS_PER_THREAD: usize = 4;
 
-/// What is known of a whole file where a part of it is read.
+/// Properties of a whole file, which a reader of a part of it must know.
 #[derive(Clone, Default)]
 pub(super) struct FileTraits {
     /// The likely encoding of names that are not UTF-8.
@@ -141,7 +141,7 @@ impl Batch {
 #[derive(Default)]
 struct PartState {
     part: Part,
-    /// Of its corners; fewer where the last have none.
+    /// The normals of its corners; fewer where the last have none.
     normals: Vec<Normal>,
     /// Faces without texture coordinates.
     bare_faces: u64,
@@ -206,14 +206,14 @@ struct Obj<'a> {
     lines: u64,
 }
 
-/// How far the faces of a chunk have their parts.
+/// The place of the faces of a chunk among the parts.
 struct Placing {
     /// The first face without one.
     first: usize,
     /// A face, and the number of corners before it.
     corner_face: usize,
     corner: usize,
-    /// How many texture coordinates come before the chunk.
+    /// The number of texture coordinates before the chunk.
     texcoords_before: usize,
 }
 
@@ -221,7 +221,7 @@ struct Placing {
 struct Placed {
     statements: Statements,
     runs: Vec<Run>,
-    /// How many positions, texture coordinates and normals come before it.
+    /// The numbers of positions, texture coordinates and normals before it.
     before: [usize; 3],
 }
 
@@ -294,7 +294,7 @@ impl<'a> Obj<'a> {
         triangles.into_iter().try_for_each(|chunk| self.join(chunk))
     }
 
-    /// How many positions, texture coordinates and normals there are so far.
+    /// The numbers of positions, texture coordinates and normals so far.
     fn counts(&self) -> [usize; 3] {
         [self.positions.len(), self.texcoords.len(), self.normals.len()]
     }

@@ -1,6 +1,6 @@
-//! What the values of an opacity map ask of a material: a cutoff or blending.
+//! The values of an opacity map decide whether its material has a cutoff or is blended.
 
-/// What an opacity map does to what it is on.
+/// The effect of an opacity map on a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Opacity {
     /// All of it is opaque.
@@ -30,7 +30,7 @@ const MOST_IN_AREAS: f64 = 0.01;
 const MOSTLY: f64 = 0.5;
 
 impl Opacity {
-    /// Of a map with these alpha values, row by row.
+    /// Judges a map with these alpha values, row by row.
     pub(super) fn of(width: usize, alpha: &[u8]) -> Self {
         if alpha.iter().all(|value| *value >= OPAQUE) {
             return Self::Opaque;

@@ -20,7 +20,7 @@ const LONGEST_PATH: usize = 4096;
 /// Looks up file names on behalf of one model.
 pub(super) struct Finder {
     folder: PathBuf,
-    /// What is in each folder that was searched.
+    /// The entries of each folder that was searched.
     listings: BTreeMap<PathBuf, Listing>,
     /// See [`Finder::absent`].
     absent: Vec<PathBuf>,
@@ -163,7 +163,7 @@ impl Finder {
 }
 
 impl Listing {
-    /// Of a folder; empty where it is none or cannot be read.
+    /// Lists a folder; the list is empty where it is none or cannot be read.
     fn of(folder: &Path) -> Self {
         // A model named without a folder lies in the current one.
         let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };

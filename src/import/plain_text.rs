@@ -15,14 +15,14 @@ const HEAD_BYTES: u64 = 1 << 20;
 /// Bytes of UTF-16 that are decoded at a time.
 const DECODED_BYTES: usize = 1 << 16;
 
-/// What some editors begin a UTF-8 text with.
+/// The mark with which some editors begin a UTF-8 text.
 pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// A text file.
 pub(super) struct PlainText<'a> {
     /// The beginning.
     pub(super) head: Vec<u8>,
-    /// What follows.
+    /// The bytes that follow.
     pub(super) rest: Box<dyn Read + Send + 'a>,
 }
 
@@ -85,7 +85,7 @@ struct Utf16Reader<R> {
     decoder: Decoder,
     bytes: Vec<u8>,
     text: Vec<u8>,
-    /// How much of `text` was handed out.
+    /// The number of bytes of `text` that were handed out.
     at: usize,
     ended: bool,
 }

@@ -15,7 +15,7 @@ use super::words::Words;
 /// The tiles that are looked for to tell whether a name with [`UDIM`] is one of files.
 const LIKELY_TILES: Range<u32> = FIRST_TILE..FIRST_TILE + 100;
 
-/// What stands for a tile's number in a file name, in lower case.
+/// The placeholder of a tile's number in a file name, in lower case.
 const UDIM: &[u8] = b"<udim>";
 
 /// True where a statement names a file for each UDIM tile.
@@ -44,7 +44,7 @@ pub(super) struct TextureStatement {
     pub(super) file: Option<PathBuf>,
     pub(super) transform: UvTransform,
     pub(super) is_clamped: bool,
-    /// What is wrong with the values of `-s` or `-o`.
+    /// A fault in the values of `-s` or `-o`.
     pub(super) problem: Option<&'static str>,
 }
 

@@ -18,7 +18,7 @@ pub(super) struct Textures {
     opacities: OpacityCache,
 }
 
-/// What opacity maps do, by file and by whether its own alpha channel alone counts: each is decoded
+/// The effects of opacity maps, by file and by whether its own alpha channel alone counts: each is decoded
 /// once for all parts of a model that are read one after the other.
 #[derive(Clone, Default)]
 pub(super) struct OpacityCache(Arc<Mutex<BTreeMap<(PathBuf, bool), Result<Opacity, String>>>>);
@@ -51,7 +51,7 @@ impl Textures {
         })
     }
 
-    /// What the opacity map in `file` does, or why it cannot be read. `is_own_alpha`: the same file
+    /// Returns the effect of the opacity map in `file`, or why it cannot be read. `is_own_alpha`: the same file
     /// gives the colour, so that its alpha channel alone is opacity.
     pub(super) fn opacity(&self, file: &Path, is_own_alpha: bool) -> Result<Opacity, String> {
         let mut known = self.opacities.0.lock().unwrap_or_else(PoisonError::into_inner);

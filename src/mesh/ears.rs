@@ -41,7 +41,7 @@ struct Corner {
     before: u32,
     after: u32,
     is_clipped: bool,
-    /// How often its neighbours changed.
+    /// The number of changes of its neighbours.
     changes: u32,
     /// The ears that it blocks.
     blocks: Vec<Candidate>,

@@ -95,8 +95,8 @@ impl Normal {
         rounded
     }
 
-    /// What a vertex has in the place of its normal while its mesh is simplified: the number of a set of
-    /// normals.
+    /// The number of a set of normals, which a vertex has in place of its normal while its mesh is
+    /// simplified.
     pub(crate) fn of_set(number: usize) -> Self {
         Self(number as u32 + 1)
     }

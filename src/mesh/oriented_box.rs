@@ -57,7 +57,7 @@ impl OrientedBox {
         outside.length_squared() * Self::LESS
     }
 
-    /// What squared distances are multiplied with so that rounding makes none too large.
+    /// The factor of squared distances, so that rounding makes none too large.
     pub const LESS: f32 = 1.0 - 2.0 * ROUNDING;
 }
 

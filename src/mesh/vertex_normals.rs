@@ -53,7 +53,7 @@ impl VertexNormals {
         self.entries[entry as usize].normal
     }
 
-    /// How many entries there are.
+    /// The number of entries.
     pub fn len(&self) -> usize {
         self.entries.len()
     }

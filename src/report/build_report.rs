@@ -177,8 +177,8 @@ pub enum UpFrom {
 }
 
 impl FileReport {
-    /// Of a file on disk. What is no regular file, or may not be opened, has no bytes: should a file
-    /// appear there, that is a change. A texture or library that is too large to be read is known by
+    /// Reads a file on disk. A path without a regular file that may be opened has no bytes: should a
+    /// file appear there, that is a change. A texture or library that is too large to be read is known by
     /// its size alone.
     pub fn read(path: &Path) -> Result<Self> {
         let failed = |error: std::io::Error| Error::input(path, format!("cannot be read: {error}"));

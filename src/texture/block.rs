@@ -29,7 +29,7 @@ pub struct TextureOptions {
     pub max_atlas: u32,
     /// Whether coarse nodes give up texture seams.
     pub seams: Seams,
-    /// Whether triangles without a texture have normals.
+    /// True if triangles without a texture have normals.
     pub normals: bool,
     /// Triangles of the block's root; seams are in the way where it has few for each chart.
     pub root_triangles: usize,

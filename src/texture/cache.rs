@@ -47,7 +47,7 @@ struct Slot {
     findings: Findings,
 }
 
-/// What is imperfect about a decoded image.
+/// The faults of a decoded image.
 #[derive(Clone, Copy, Debug, Default)]
 struct Findings {
     /// It has an alpha channel that no material uses.

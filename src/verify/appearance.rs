@@ -163,7 +163,7 @@ pub(super) struct LevelAppearance {
     pub color_rms: Option<f64>,
     /// The share of the source's coloured points that it is of: those for which something stands.
     pub color_share: Option<f64>,
-    /// Where its mean colour is another.
+    /// Regions where its mean colour is another.
     pub regions: ColorRegions,
     /// Tiles of generated cities.
     pub tiles: Option<TileFigures>,

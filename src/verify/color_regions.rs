@@ -1,4 +1,4 @@
-//! Which share of a level's surface has another colour than the source, region by region.
+//! Measures the share of a level's surface that has another colour than the source, region by region.
 //!
 //! The colour of single points says little: a coarse texture is a blurred one, and a coarse surface is
 //! off by the node's error, so that details are elsewhere. So the mean colour of regions is compared, in
@@ -38,7 +38,7 @@ pub(super) struct ComparedPoint {
 pub(super) struct ColorRegions {
     /// Points in regions that were compared.
     pub points: u64,
-    /// Of these, points in regions of another colour.
+    /// Those of these points that are in regions of another colour.
     pub wrong: u64,
     /// The node that has most of the wrong points, how many it has, and one of them.
     pub worst: Option<(u32, u64, DVec3)>,
@@ -84,7 +84,7 @@ impl ColorRegions {
     }
 }
 
-/// Whether the mean colours of points differ.
+/// True if the mean colours of points differ.
 fn is_other_color<'a>(points: impl Iterator<Item = &'a ComparedPoint>) -> bool {
     let (mut shown, mut source, mut count) = ([0.0; 3], [0.0; 3], 0.0);
     for point in points {

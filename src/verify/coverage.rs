@@ -1,4 +1,4 @@
-//! Whether the leaves cover each triangle of the source exactly once.
+//! Checks that the leaves cover each triangle of the source exactly once.
 //!
 //! A triangle of a leaf is a triangle of the source or a part of one, whose corners rounding has
 //! moved by at most some distance d. So its centroid is within d of that triangle, and its area
@@ -15,7 +15,7 @@ use super::geometry::NodeGeometry;
 use super::sample::area;
 use crate::mesh::{DisjointSet, Surface};
 
-/// What the leaves have of a group of source triangles.
+/// A group of source triangles, and their part in the leaves.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Group {
     /// A source triangle of the group, the one with the least number.
@@ -24,12 +24,12 @@ pub(super) struct Group {
     pub source: f64,
     /// Area of the leaf triangles on them, square metres.
     pub leaves: f64,
-    /// What rounding may change at most, square metres.
+    /// The most that rounding may change, square metres.
     pub bound: f64,
 }
 
 impl Group {
-    /// Whether the areas differ by more than rounding explains.
+    /// True if the areas differ by more than rounding explains.
     pub fn is_wrong(&self) -> bool {
         let difference = (self.leaves - self.source).abs();
         difference.is_nan() || difference > self.bound

@@ -31,7 +31,7 @@ pub(super) fn rounding(scene: &Scene, node: u32, step: f64, vertex_bound: f64) -
     }
 }
 
-/// How far the cuts on the way to a leaf may move a vertex, metres: half a step along each axis for
+/// The most by which the cuts on the way to a leaf may move a vertex, metres: half a step along each axis for
 /// each. A coarse node counts as a leaf on its scene's last level.
 fn rounding_of_cuts(scene: &Scene, node: u32, step: f64) -> f64 {
     let factor = scene.parameters["level_factor"].as_u64().unwrap_or(4).clamp(2, 64);

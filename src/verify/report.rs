@@ -86,7 +86,7 @@ pub struct Check {
     pub failures: Vec<Failure>,
     /// All failures.
     pub failure_count: u64,
-    /// What is doubtful and does not fail.
+    /// Findings that are doubtful and do not fail.
     pub warnings: Vec<Failure>,
 }
 

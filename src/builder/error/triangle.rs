@@ -28,7 +28,7 @@ pub(super) struct Triangle {
     pub origin: Vec3,
     pub along: Vec3,
     pub up: Vec3,
-    /// Of the longest edge.
+    /// The length of the longest edge.
     pub length: f32,
     pub apex: [f32; 2],
 }
@@ -39,7 +39,7 @@ pub(super) struct Frame {
     pub origin: DVec3,
     pub along: DVec3,
     pub up: DVec3,
-    /// Of the longest edge.
+    /// The length of the longest edge.
     pub length: f64,
     pub apex: DVec2,
 }
@@ -100,7 +100,7 @@ impl Triangle {
         }
     }
 
-    /// What its frame is in f64.
+    /// Returns its frame in f64.
     pub fn frame(&self) -> Frame {
         let [origin, along, up] = [self.origin, self.along, self.up].map(Vec3::as_dvec3);
         Frame {

@@ -6,7 +6,7 @@ use crate::builder::border::slit::close_slits;
 use crate::builder::border::vertex::Border;
 use crate::mesh::{Mesh, Normal, PositionKey, color_key, key, texcoord_key};
 
-/// What makes two vertices one: position, texture coordinate, colour, material and normal.
+/// Vertices are one where these are equal: position, texture coordinate, colour, material and normal.
 type VertexKey = (PositionKey<f32>, u64, u64, u32, Normal);
 
 /// Joins meshes that bound each other at planes beyond the first `parent_planes`.

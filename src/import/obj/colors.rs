@@ -14,7 +14,7 @@ pub(in crate::import) const WHITE: [u16; 4] = [u16::MAX; 4];
 /// Largest integer that is kept: below [`WHITE`]'s components.
 const LARGEST: f64 = 65534.0;
 
-/// What colours' components are, as far as they were read.
+/// The range of colours' components, as far as they were read.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::import) struct ColorRange {
     /// Some component is no integer: full intensity is 1.
@@ -53,7 +53,7 @@ pub(in crate::import) struct Colors {
     /// Empty until a vertex has a colour, then one per position.
     pub(in crate::import) values: Vec<[u16; 4]>,
     pub(in crate::import) range: ColorRange,
-    /// How many have a component that is out of range and was clamped.
+    /// The number of colours with a component that was out of range and is clamped.
     pub(in crate::import) clamped: u64,
 }
 

@@ -70,7 +70,7 @@ pub(in crate::import) enum Change {
 }
 
 impl Change {
-    /// What the statement gives.
+    /// The name that the statement gives.
     pub(in crate::import) fn name(&self) -> &[u8] {
         match self {
             Self::Group(name) | Self::Material(name) | Self::Libraries(name) => name,
@@ -92,7 +92,7 @@ pub(in crate::import) struct Statements {
     pub(in crate::import) faces: Vec<u32>,
     /// With the number of faces before each.
     pub(in crate::import) changes: Vec<(usize, Change)>,
-    /// How many positions, texture coordinates and normals there must be before the chunk.
+    /// The least numbers of positions, texture coordinates and normals before the chunk.
     needed: [i64; 3],
     /// How many there are, once that is known; then indices out of range are left out.
     before: Option<[usize; 3]>,

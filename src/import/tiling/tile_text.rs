@@ -55,7 +55,7 @@ pub(super) struct Belongs {
     pub material: usize,
 }
 
-/// What all statements so far that faces may belong to give, in the encoding of the file.
+/// The names that all statements so far give to faces, in the encoding of the file.
 #[derive(Default)]
 pub(super) struct Names {
     pub libraries: Vec<Vec<u8>>,

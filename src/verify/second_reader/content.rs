@@ -1,4 +1,4 @@
-//! What a reader finds in a file, in figures that do not depend on the order of anything.
+//! The contents of a file as a reader finds them, in figures that do not depend on the order of anything.
 
 use std::collections::{BTreeMap, HashSet};
 use std::hash::{BuildHasher, BuildHasherDefault};
@@ -66,7 +66,7 @@ impl MaterialContent {
 }
 
 impl Content {
-    /// What the importer found.
+    /// The contents as the importer found them.
     pub fn of(model: &Model) -> Self {
         let [low, high] = model.bounds().map(DVec3::from);
         let count = model.triangle_count() as u64;

@@ -30,10 +30,10 @@ struct Reader<'a> {
     document: &'a gltf::Document,
     buffers: Vec<Vec<u8>>,
     folder: &'a Path,
-    /// How many materials have each name.
+    /// The number of materials of each name.
     names: BTreeMap<&'a str, usize>,
     polygons: Polygons,
-    /// By the texture's image and wrapping.
+    /// The entries are by the texture's image and wrapping.
     samples: BTreeMap<(usize, [u8; 2]), Samples>,
     content: Content,
 }

@@ -37,11 +37,11 @@ const HINT: &str = "look at what the build warns of in this file; if it warns of
 pub(super) struct Comparison {
     /// The file as it was named.
     file: String,
-    /// What differs; or why the file was not compared.
+    /// The differences, or why the file was not compared.
     outcome: Result<Compared, String>,
 }
 
-/// What was compared of a file.
+/// The comparison of a file.
 #[derive(Default)]
 struct Compared {
     differences: Vec<String>,

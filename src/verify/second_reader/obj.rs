@@ -11,7 +11,7 @@ use crate::color::srgb_to_linear;
 use crate::mesh::Wrap;
 use crate::side_file;
 
-/// What the importer calls the material of faces that have none.
+/// The importer's name for the material of faces that have none.
 const NO_MATERIAL: &str = "default";
 
 /// A colour as the file has it, encoded; and a texture that it multiplies.
@@ -27,7 +27,7 @@ struct Look {
 struct Reader {
     folder: PathBuf,
     positions: Vec<DVec3>,
-    /// Of each position, encoded; `None` where it has none.
+    /// The colour of each position, encoded; `None` where it has none.
     colors: Vec<Option<[f64; 3]>>,
     texcoords: Vec<[f64; 2]>,
     looks: BTreeMap<String, Look>,

@@ -15,7 +15,7 @@ const FINE: u32 = 5;
 pub(super) struct Sample {
     pub texcoords: [[f32; 2]; 3],
     pub area: f64,
-    /// What the texture is multiplied by.
+    /// The factor of the texture.
     pub light: [f64; 3],
 }
 
