@@ -11,7 +11,7 @@ use std::path::Path;
 
 use hlod::bench::ClockConstants;
 use hlod::camera::{format_path, parse_path};
-use hlod::format::{NodeLabel, Scene, file_crc, read_glb, write_glb};
+use hlod::format::{NodeId, NodeLabel, Scene, file_crc, read_glb, write_glb};
 use hlod::mesh::{Model, UpAxis};
 use hlod::{Error, Result};
 use hlod::{decode, import};
@@ -156,7 +156,7 @@ fn node(bytes: &[u8]) -> bool {
             assert!(primitive.indices.iter().all(|&at| (at as usize) < vertices));
             assert!(primitive.surface.image.is_none_or(|image| image < mesh.images.len()));
         }
-        let again = write_glb(mesh, UpAxis::Z, NodeLabel { id: 1, level: 0 });
+        let again = write_glb(mesh, UpAxis::Z, NodeLabel { id: NodeId(1), level: 0 });
         if let Ok(again) = again {
             assert!(read_glb(&again, Path::new("node.glb")).is_ok());
         }

@@ -5,7 +5,7 @@ use std::cell::Cell;
 use std::path::Path;
 
 use hlod::format::{
-    BlockInfo, Node, NodeImage, NodeImageData, NodeLabel, NodeMesh, Primitive, Scene,
+    BlockInfo, Node, NodeId, NodeImage, NodeImageData, NodeLabel, NodeMesh, Primitive, Scene,
     SharedTexture, Surface, read_glb, write_glb,
 };
 use hlod::mesh::{AlphaMode, UpAxis, Wrap};
@@ -81,7 +81,7 @@ fn node_file() -> Vec<u8> {
             },
         }],
     };
-    write_glb(&mesh, UpAxis::Z, NodeLabel { id: 1, level: 0 }).unwrap()
+    write_glb(&mesh, UpAxis::Z, NodeLabel { id: NodeId(1), level: 0 }).unwrap()
 }
 
 fn scene_file() -> Vec<u8> {
@@ -97,7 +97,7 @@ fn scene_file() -> Vec<u8> {
             bytes: 9,
         }],
         nodes: vec![Node {
-            id: 1,
+            id: NodeId(1),
             parent: None,
             first_child: None,
             next_sibling: None,

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use hlod::format::{
-    BlockInfo, Node, NodeImage, NodeImageData, NodeLabel, NodeMesh, Primitive, Scene,
+    BlockInfo, Node, NodeId, NodeImage, NodeImageData, NodeLabel, NodeMesh, Primitive, Scene,
     SharedTexture, Surface, read_glb, write_glb,
 };
 use hlod::mesh::{AlphaMode, Normal, UpAxis, Wrap};
@@ -60,7 +60,7 @@ prop_compose! {
             let above = parent.map(|parent| &nodes[parent as usize]);
             let block = above.map_or(Some(crc % names.len() as u32), |above| above.block);
             nodes.push(Node {
-                id: (index as u64) << 32 | u64::from(crc),
+                id: NodeId((index as u64) << 32 | u64::from(crc)),
                 parent,
                 first_child: None,
                 next_sibling: None,
@@ -186,7 +186,7 @@ fn mesh() -> impl Strategy<Value = NodeMesh> {
 }
 
 fn label() -> impl Strategy<Value = NodeLabel> {
-    (any::<u64>(), any::<u32>()).prop_map(|(id, level)| NodeLabel { id, level })
+    (any::<u64>(), any::<u32>()).prop_map(|(id, level)| NodeLabel { id: NodeId(id), level })
 }
 
 proptest! {

@@ -13,7 +13,9 @@ use crate::builder::hierarchy::Tree;
 use crate::builder::options::same_nodes;
 use crate::format::attributes::Attributes;
 use crate::format::rims::Rims;
-use crate::format::{NODES_DIR, OutputDir, REPORT_FILE, Scene, SharedTexture, TEXTURES_DIR};
+use crate::format::{
+    NODES_DIR, NodeId, OutputDir, REPORT_FILE, Scene, SharedTexture, TEXTURES_DIR,
+};
 use crate::mesh::Warnings;
 use crate::report::build_report::{BuildReport, DistrictReport, FileReport, InputReport};
 
@@ -35,7 +37,7 @@ pub struct Earlier {
     /// Nodes, by file.
     node_of: FxHashMap<String, u32>,
     /// Entries of the report on nodes over their budget, by id.
-    over_budget_of: FxHashMap<u64, usize>,
+    over_budget_of: FxHashMap<NodeId, usize>,
 }
 
 fn is_as_written(dir: &Path, file: &FileReport) -> bool {

@@ -13,7 +13,7 @@ use super::options::CellOptions;
 use crate::bench::Session;
 use crate::bench::write_beside;
 use crate::format::cells::{CELLS_DIR, CELLS_FILE, Cell, Cells, Face};
-use crate::format::{Encoding, NodeLabel, file_crc, write_glb_encoded};
+use crate::format::{Encoding, NodeId, NodeLabel, file_crc, write_glb_encoded};
 use crate::{Error, Result};
 
 /// The index is written again after so many cells, so that a run that is killed loses no more.
@@ -225,7 +225,7 @@ fn cell(
         FORM.prepare(&mut made.mesh);
         let [i, j, k] = place;
         let file = format!("c{i}_{j}_{k}-{direction}-{kind}.glb");
-        let label = NodeLabel { id: direction, level: 0 };
+        let label = NodeLabel { id: NodeId(direction), level: 0 };
         let scene = session.scene();
         let bytes = write_glb_encoded(&made.mesh, scene.up, label, FORM, scene.copyright())?;
         write_beside(&out.join(CELLS_DIR).join(&file), &bytes)?;

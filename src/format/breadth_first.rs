@@ -35,11 +35,11 @@ impl Scene {
 
 #[cfg(test)]
 mod tests {
-    use crate::format::{Node, Scene};
+    use crate::format::{Node, NodeId, Scene};
 
     fn node(id: u64, links: [Option<u32>; 3]) -> Node {
         let [parent, first_child, next_sibling] = links;
-        Node { id, parent, first_child, next_sibling, ..Node::default() }
+        Node { id: NodeId(id), parent, first_child, next_sibling, ..Node::default() }
     }
 
     #[test]
@@ -59,12 +59,12 @@ mod tests {
         };
         let found = scene.breadth_first();
         let ids = |nodes: &mut dyn Iterator<Item = u32>| {
-            nodes.map(|node| found.nodes[node as usize].id).collect::<Vec<_>>()
+            nodes.map(|node| found.nodes[node as usize].id.0).collect::<Vec<_>>()
         };
         assert_eq!(ids(&mut (0..7)), [0, 6, 1, 4, 2, 3, 5]);
         assert_eq!(ids(&mut found.roots()), [0, 6]);
         for (above, children) in [(0, &[1, 4][..]), (1, &[2, 3]), (4, &[5]), (6, &[]), (5, &[])] {
-            let place = found.nodes.iter().position(|node| node.id == above).unwrap() as u32;
+            let place = found.nodes.iter().position(|node| node.id.0 == above).unwrap() as u32;
             assert_eq!(ids(&mut found.children(place)), children, "{above}");
             assert!(found.children(place).all(|c| found.nodes[c as usize].parent == Some(place)));
         }

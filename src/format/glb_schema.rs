@@ -3,6 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::node_id::NodeId;
+
 /// `glTF` as little-endian u32.
 pub(super) const MAGIC: u32 = 0x4654_6C67;
 /// `JSON` as little-endian u32.
@@ -100,7 +102,7 @@ pub(super) struct Placement {
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub(super) struct Extras {
-    pub id: u64,
+    pub id: NodeId,
     pub level: u32,
 }
 

@@ -4,12 +4,13 @@ use std::path::Path;
 
 use super::encoding::Encoding;
 use super::glb_write::{NodeLabel, write_glb, write_glb_encoded};
+use super::node_id::NodeId;
 use super::node_mesh::{NodeImageData, NodeMesh, Primitive};
 use super::test_mesh::mesh;
 use super::{glb_read::read_glb, glb_schema};
 use crate::mesh::{AlphaMode, UpAxis, Wrap};
 
-const LABEL: NodeLabel = NodeLabel { id: u64::MAX, level: 2 };
+const LABEL: NodeLabel = NodeLabel { id: NodeId(u64::MAX), level: 2 };
 
 fn write(mesh: &NodeMesh, up: UpAxis) -> Vec<u8> {
     write_glb(mesh, up, LABEL).unwrap()

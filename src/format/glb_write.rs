@@ -6,6 +6,7 @@ use super::encoding::Encoding;
 use super::file_name::is_plain_file_name;
 use super::glb_packed::{encode_triangles, encode_vertices};
 use super::glb_schema::{self as schema, *};
+use super::node_id::NodeId;
 use super::node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 use super::quantized::{in_shares, in_steps, is_in_steps};
 use crate::mesh::{AlphaMode, Normal, UpAxis, Wrap};
@@ -15,7 +16,7 @@ use crate::{Error, Result};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeLabel {
     /// [`Node::id`](super::Node::id).
-    pub id: u64,
+    pub id: NodeId,
     /// [`Node::level`](super::Node::level) as it is where no coarse node is left out: the depth of its
     /// division.
     pub level: u32,

@@ -26,6 +26,7 @@ mod glb_schema;
 mod glb_tests;
 mod glb_write;
 mod index_file;
+mod node_id;
 mod node_mesh;
 mod output_dir;
 #[cfg(test)]
@@ -50,6 +51,7 @@ pub use encoding::Encoding;
 pub use file_name::is_plain_file_name;
 pub use glb_read::{read_glb, read_glb_without_normals};
 pub use glb_write::{NodeLabel, write_glb, write_glb_encoded};
+pub use node_id::NodeId;
 pub use node_mesh::{NodeImage, NodeImageData, NodeMesh, Primitive, Surface};
 pub(crate) use output_dir::resolve;
 pub use output_dir::{OutputDir, Unfinished, check_apart};
@@ -82,7 +84,7 @@ pub const REPORT_FILE: &str = "build.json";
 /// take it for text.
 pub const SCENE_MAGIC: [u8; 8] = *b"HLODSCN\x1a";
 /// The version of the scene file that this crate writes, and the only one that it reads.
-pub const SCENE_VERSION: u32 = 3;
+pub const SCENE_VERSION: u32 = 4;
 
 /// CRC-32 (ISO-HDLC, as in zip and PNG) of a node's file, as [`Node::file_crc`] keeps it.
 pub fn file_crc(bytes: &[u8]) -> u32 {

@@ -2,6 +2,7 @@
 
 use std::collections::BinaryHeap;
 
+use super::node_id::NodeId;
 use crate::mesh::UpAxis;
 
 /// The contents of `scene.hlod`.
@@ -53,7 +54,7 @@ pub struct SharedTexture {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Node {
     /// Unique within the scene, and the same in every build of the same source.
-    pub id: u64,
+    pub id: NodeId,
     /// Index of the node that shows more than this piece, more coarsely; `None` at a root.
     pub parent: Option<u32>,
     /// Index of the first of the nodes that together show this piece in finer detail.

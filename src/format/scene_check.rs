@@ -5,6 +5,7 @@ use std::fmt;
 use rustc_hash::FxHashMap;
 
 use super::file_name::is_plain_file_name;
+use super::node_id::NodeId;
 use super::scene::{Node, Scene};
 
 /// How many defects [`Scene::check`] collects before it stops looking.
@@ -209,7 +210,7 @@ pub enum SceneDefect {
         /// The earlier one.
         other: u32,
         /// The id.
-        found: u64,
+        found: NodeId,
     },
 }
 

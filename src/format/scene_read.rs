@@ -5,6 +5,7 @@ use std::path::Path;
 use super::SCENE_FILE;
 use super::bytes::{Cursor, CutShort};
 use super::index_file::NotWhole;
+use super::node_id::NodeId;
 use super::scene::{BlockInfo, Node, Scene, SharedTexture};
 use super::scene_check::SceneDefect;
 use super::scene_write::{FLAG_TEXTURED, FLAG_Z_UP, SCENE};
@@ -150,7 +151,7 @@ fn block(cursor: &mut Cursor<'_>) -> Result<BlockInfo, Unreadable> {
 
 fn node(cursor: &mut Cursor<'_>) -> Result<Node, Unreadable> {
     Ok(Node {
-        id: cursor.u64("id of a node")?,
+        id: NodeId(cursor.u64("id of a node")?),
         parent: index(cursor, "parent of a node")?,
         first_child: index(cursor, "first child of a node")?,
         next_sibling: index(cursor, "next sibling of a node")?,

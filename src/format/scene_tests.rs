@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::node_id::NodeId;
 use super::scene::Scene;
 use super::scene_check::{Element, SceneDefect};
 use super::sink::NONE;
@@ -319,8 +320,8 @@ fn every_defect_is_found() {
         ),
         (
             "same id",
-            |s| s.nodes[4].id = 100,
-            |d| matches!(d, D::SameId { node: 4, other: 0, found: 100 }),
+            |s| s.nodes[4].id = NodeId(100),
+            |d| matches!(d, D::SameId { node: 4, other: 0, found: NodeId(100) }),
         ),
     ];
     for (name, spoil, expected) in cases {

@@ -78,7 +78,7 @@ impl Scene {
 
 impl Sink {
     fn node(&mut self, node: &Node) -> Result<()> {
-        self.u64(node.id);
+        self.u64(node.id.0);
         for link in [node.parent, node.first_child, node.next_sibling] {
             self.u32(link.unwrap_or(NONE));
         }

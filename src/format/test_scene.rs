@@ -1,12 +1,13 @@
 //! A small sound scene for tests: two trees, one of two blocks' and one of a single node.
 
+use super::node_id::NodeId;
 use super::scene::{BlockInfo, Node, Scene, SharedTexture};
 use crate::mesh::UpAxis;
 
 /// Node 0 stands above node 1 (block 0), which has the leaves 2 and 3; node 4 is alone (block 1).
 pub(crate) fn scene() -> Scene {
     let node = |id: u64, parent, first_child, next_sibling, level, block, error| Node {
-        id: 100 + id,
+        id: NodeId(100 + id),
         parent,
         first_child,
         next_sibling,

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::builder::Subset;
-use crate::format::check_regular;
+use crate::format::{NodeId, check_regular};
 use crate::import::is_model;
 use crate::mesh::{Kept, UpAxis, Warnings};
 use crate::texture::BakeReason;
@@ -286,7 +286,7 @@ impl Count {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OverBudget {
     /// [`Node::id`](crate::format::Node).
-    pub id: u64,
+    pub id: NodeId,
     /// [`Node::file`](crate::format::Node).
     pub file: String,
     /// Triangles that it should have at most.
@@ -314,7 +314,7 @@ pub struct LeftOutNode {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Baked {
     /// [`Node::id`](crate::format::Node).
-    pub id: u64,
+    pub id: NodeId,
     /// [`Node::file`](crate::format::Node).
     pub file: String,
     /// Why.

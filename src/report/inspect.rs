@@ -292,6 +292,7 @@ fn metres(length: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::NodeId;
     use crate::format::test_scene::scene;
 
     #[test]
@@ -301,9 +302,10 @@ mod tests {
         assert_eq!(nodes.len(), 5);
         assert_eq!(nodes[0]["parent"], Value::Null);
         assert_eq!(nodes[0]["block"], Value::Null);
-        assert_eq!(nodes[1]["parent"], 100);
-        assert_eq!(nodes[1]["first_child"], 103);
-        assert_eq!(nodes[3]["next_sibling"], 102);
+        let id = |number: u64| NodeId(number).to_string();
+        assert_eq!(nodes[1]["parent"], id(100));
+        assert_eq!(nodes[1]["first_child"], id(103));
+        assert_eq!(nodes[3]["next_sibling"], id(102));
         let wanted = [
             "id",
             "parent",
@@ -347,7 +349,7 @@ mod tests {
         scene.nodes.truncate(1);
         for child in 1..=1000u32 {
             let mut node = scene.nodes[0].clone();
-            node.id = u64::from(1000 + child);
+            node.id = NodeId(u64::from(1000 + child));
             node.file = format!("c{child}.glb");
             node.parent = Some(0);
             node.level = 1;

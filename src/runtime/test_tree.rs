@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::SceneTree;
 use crate::camera::{Pose, View, from_angles};
-use crate::format::{BlockInfo, Node, Scene};
+use crate::format::{BlockInfo, Node, NodeId, Scene};
 use crate::mesh::UpAxis;
 
 /// A node of a scene to be: where it is, what it costs, and what it consists of.
@@ -61,7 +61,7 @@ fn add(nodes: &mut Vec<Node>, sketch: Sketch, parent: Option<u32>, level: u32) {
     let index = nodes.len() as u32;
     let corner = |sign: f64| sketch.centre.map(|c| c + sign * sketch.size / 2.0);
     nodes.push(Node {
-        id: u64::from(index),
+        id: NodeId(index.into()),
         parent,
         level,
         block: Some(0),

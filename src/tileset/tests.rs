@@ -4,9 +4,8 @@ use serde_json::{Value, json};
 
 use super::files::files_of;
 use super::*;
-use crate::format::Scene;
 use crate::format::test_scene::scene;
-use crate::format::{TILESET_FILE, TILESETS_DIR};
+use crate::format::{NodeId, Scene, TILESET_FILE, TILESETS_DIR};
 use crate::place::{Place, Placement};
 
 const UTM: Placement = Placement::Crs { epsg: 25832, height_offset: 0.0 };
@@ -46,7 +45,7 @@ fn quarters(side: f64, depth: u32) -> Scene {
                 parent.first_child.get_or_insert(index);
             }
             nodes.push(crate::format::Node {
-                id: index.into(),
+                id: NodeId(index.into()),
                 parent,
                 first_child: None,
                 next_sibling: (number > 0 && place % 4 < 3).then_some(index + 1),

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::options::VerifyOptions;
 use crate::cells::SeenFaces;
+use crate::format::NodeId;
 use crate::mesh::Kept;
 use crate::{Error, Result};
 
@@ -263,7 +264,7 @@ pub struct ErrorFigures {
 #[derive(Clone, Debug, Serialize)]
 pub struct NodeFigures {
     /// Its id.
-    pub id: u64,
+    pub id: NodeId,
     /// Its file.
     pub file: String,
     /// Its level.

@@ -12,7 +12,7 @@ use hlod::camera::{
 };
 use hlod::city::{CityOptions, TextureSize};
 use hlod::format::cells::Cells;
-use hlod::format::{NodeLabel, NodeMesh, file_crc, read_glb, write_glb};
+use hlod::format::{NodeId, NodeLabel, NodeMesh, file_crc, read_glb, write_glb};
 use hlod::picture_error::{Gaps, mean_squared_error, psnr};
 use hlod::render::{RenderOptions, Side};
 use image::{DynamicImage, GrayImage, Luma, Rgba, RgbaImage};
@@ -303,7 +303,7 @@ fn change_faces(place: &Place, change: &dyn Fn(&mut NodeMesh)) {
         ];
         let triangles = mesh.primitives.iter().map(|part| part.indices.len() as u32 / 3);
         face.triangles = triangles.sum();
-        let label = NodeLabel { id: direction, level: 0 };
+        let label = NodeLabel { id: NodeId(direction), level: 0 };
         let bytes = write_glb(&mesh, place.scene().up, label).unwrap();
         (face.file_bytes, face.file_crc) = (bytes.len() as u64, file_crc(&bytes));
         fs::write(&path, bytes).unwrap();

@@ -1,6 +1,6 @@
 //! A street of any depth, made without files.
 
-use hlod::format::{BlockInfo, Node, Scene};
+use hlod::format::{BlockInfo, Node, NodeId, Scene};
 use hlod::mesh::UpAxis;
 
 /// Houses in two rows, each a tree of four children a node.
@@ -31,7 +31,7 @@ fn add(
 ) -> u32 {
     let index = nodes.len() as u32;
     nodes.push(Node {
-        id: u64::from(index),
+        id: NodeId(index.into()),
         parent,
         level,
         block: Some(0),

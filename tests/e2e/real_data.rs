@@ -55,7 +55,7 @@ fn check(set: &str) {
     // the block is a leaf.
     for root in built.scene.roots() {
         let node = &built.scene.nodes[root as usize];
-        let excused = over.iter().any(|entry| entry["id"] == node.id);
+        let excused = over.iter().any(|entry| entry["id"] == node.id.to_string());
         let is_leaf = node.first_child.is_none();
         let most = (DESIRED_TRIS as f64 * if is_leaf { 2.0 } else { 1.1 }).ceil();
         assert!(

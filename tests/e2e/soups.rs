@@ -253,7 +253,7 @@ fn check_budgets(
         while let Some(index) = open.pop() {
             open.extend(built.scene.children(index as u32).map(|child| child as usize));
             let node = &built.scene.nodes[index];
-            if built.is_leaf(index) || over.iter().any(|entry| entry["id"] == node.id) {
+            if built.is_leaf(index) || over.iter().any(|entry| entry["id"] == node.id.to_string()) {
                 continue;
             }
             let below: u64 = built

@@ -8,7 +8,8 @@ use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::{Stage, Stages};
 use crate::format::attributes::{Attributes, attributes};
 use crate::format::{
-    Encoding, NODES_DIR, NodeImageData, NodeLabel, NodeMesh, OutputDir, file_crc, write_glb_encoded,
+    Encoding, NODES_DIR, NodeId, NodeImageData, NodeLabel, NodeMesh, OutputDir, file_crc,
+    write_glb_encoded,
 };
 use crate::mesh::{Kept, Mesh, UpAxis, Warnings};
 use crate::texture::{AppendedSkirts, BakeReason, BakedMesh, BlockTextures, TexturedNode};
@@ -17,8 +18,8 @@ use crate::{Error, Result};
 /// What is kept of a written node.
 #[derive(Clone, Debug)]
 pub struct NodeRecord {
-    /// Stable identity; see [`node_id`].
-    pub id: u64,
+    /// Identity, from the file's name.
+    pub id: NodeId,
     /// File name inside `nodes/`.
     pub file: String,
     /// Size of the file.
@@ -93,19 +94,12 @@ pub fn file_name(prefix: &str, child_path: &[u32]) -> String {
     }
 }
 
-/// The identity of a node: 48 bits of a hash of its file name, so that a rebuild of the same
-/// source gives the same ids whatever else changed. Fits in a JSON number.
-pub fn node_id(file: &str) -> u64 {
-    let hash = blake3::hash(file.as_bytes());
-    hash.as_bytes()[..6].iter().fold(0, |id, &byte| (id << 8) | u64::from(byte))
-}
-
 impl NodeSink for DiskSink<'_> {
     type Record = NodeRecord;
 
     fn take(&self, node: &NodeDraft) -> Result<NodeRecord> {
         let file = file_name(&self.prefix, node.child_path);
-        let id = node_id(&file);
+        let id = NodeId::of_file(&file);
         let baked = node.baked.and_then(|_| {
             self.stages.time(Stage::Bake, || self.textures.bake(node.mesh, node.resolution))
         });
@@ -211,8 +205,8 @@ fn over_budget(node: &NodeDraft, triangles: usize) -> Option<String> {
     })
 }
 
-/// Two nodes with one id, which a hash of 48 bits makes unlikely.
-pub fn check_unique(ids: &mut [(u64, String)]) -> Result<()> {
+/// Checks that no two nodes have the same id.
+pub fn check_unique(ids: &mut [(NodeId, String)]) -> Result<()> {
     ids.sort_unstable();
     match ids.windows(2).find(|pair| pair[0].0 == pair[1].0) {
         Some(pair) => Err(Error::Internal(format!(

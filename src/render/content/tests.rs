@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use super::*;
-use crate::format::{NodeImage, NodeLabel, Primitive, Surface, write_glb};
+use crate::format::{NodeId, NodeImage, NodeLabel, Primitive, Surface, write_glb};
 use crate::mesh::{AlphaMode, UpAxis, Wrap};
 
 const FILE: &str = "nodes/7.glb";
@@ -137,7 +137,7 @@ fn what_looks_alike_is_one_draw_and_colours_are_in_the_vertices() {
 #[test]
 fn files_are_decoded_as_their_meshes_are() {
     let mesh = mesh();
-    let glb = write_glb(&mesh, UpAxis::Z, NodeLabel { id: 1, level: 0 }).unwrap();
+    let glb = write_glb(&mesh, UpAxis::Z, NodeLabel { id: NodeId(1), level: 0 }).unwrap();
     let decoded = Content::decode(Path::new(FILE), &glb, shared).unwrap();
     assert_eq!(decoded, content(&mesh));
     for length in (0..glb.len()).step_by(97) {
