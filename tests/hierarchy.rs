@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use common::rays::Soup;
 use common::*;
 use hlod::builder::border::skirt::{append, triangles_of};
-use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom, TreeShape};
+use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, TreeShape};
 use hlod::builder::simplify::ladder::{BUDGET_TOLERANCE, Simplifier};
 use hlod::lattice::Lattice;
 use hlod::mesh::{Mesh, key};
@@ -22,20 +22,17 @@ fn every_option() -> Vec<HierarchyOptions> {
         (TreeShape::Thesis, 3),
         (TreeShape::Thesis, 4),
     ] {
-        for simplify_from in [SimplifyFrom::Original, SimplifyFrom::Children] {
-            for borders in [BorderMode::Locked, BorderMode::Shared, BorderMode::Skirts] {
-                for simplifier in [Simplifier::Qem, Simplifier::Clustering] {
-                    all.push(HierarchyOptions {
-                        tree,
-                        desired_tris: 150,
-                        level_factor,
-                        simplify_from,
-                        borders,
-                        simplifier,
-                        constants: all_nodes(),
-                        ..Default::default()
-                    });
-                }
+        for borders in [BorderMode::Locked, BorderMode::Skirts] {
+            for simplifier in [Simplifier::Qem, Simplifier::Clustering] {
+                all.push(HierarchyOptions {
+                    tree,
+                    desired_tris: 150,
+                    level_factor,
+                    borders,
+                    simplifier,
+                    constants: all_nodes(),
+                    ..Default::default()
+                });
             }
         }
     }
@@ -185,9 +182,6 @@ fn nodes_keep_their_budget() {
 fn errors_grow_towards_the_root() {
     let (piece, lattice) = block(wall(120, 40, 5));
     for options in every_option() {
-        if options.simplify_from == SimplifyFrom::Original {
-            continue; // The tree's owner makes those monotone.
-        }
         let nodes = build(piece.clone(), lattice, &options);
         for node in nodes.iter().filter(|node| node.level > 0) {
             let parent = nodes
@@ -195,66 +189,6 @@ fn errors_grow_towards_the_root() {
                 .find(|parent| parent.child_path[..] == node.child_path[..node.level - 1])
                 .unwrap();
             assert!(parent.error >= node.error);
-        }
-    }
-}
-
-/// What each way of treating borders costs and leaves open; figures for docs/choices.md:
-/// `cargo test --release --test hierarchy -- --ignored --nocapture`.
-#[test]
-#[ignore = "prints figures, asserts nothing that the other tests do not"]
-fn border_figures() {
-    println!(
-        "| mesh | borders | nodes over budget | worst, x budget | skirt triangles | open edges in a mixed front | widest gap, mm | median error, mm |"
-    );
-    println!("|---|---|---:|---:|---:|---:|---:|---:|");
-    let meshes = [("ball", ball(96, 20.0, 0.002, 3)), ("wall", wall(600, 120, 4))];
-    for (name, mesh) in meshes {
-        let (piece, lattice) = block(mesh);
-        for borders in [BorderMode::Locked, BorderMode::Shared, BorderMode::Skirts] {
-            let options = HierarchyOptions { borders, ..Default::default() };
-            let nodes = build(piece.clone(), lattice, &options);
-            let coarse: Vec<&Kept> = nodes.iter().filter(|node| !node.is_leaf()).collect();
-            let share = |node: &Kept| {
-                (node.mesh.triangles.len() + triangles_of(&node.skirts)) as f64 / node.budget as f64
-            };
-            let over = coarse.iter().filter(|node| share(node) > 1.1).count();
-            let worst = coarse.iter().map(|node| share(node)).fold(0.0, f64::max);
-            let skirt_triangles: usize = coarse.iter().map(|node| triangles_of(&node.skirts)).sum();
-            // A skirt is as wide as the gap that would be there without it, and a margin.
-            let skirted = HierarchyOptions { borders: BorderMode::Skirts, ..options.clone() };
-            let skirted = build(piece.clone(), lattice, &skirted);
-            let widest = skirted
-                .iter()
-                .flat_map(|node| &node.skirts)
-                .filter_map(|skirt| match skirt.corners[..] {
-                    [.., (a, _), (b, _), _, _] => {
-                        Some(f64::from(glam::Vec3::from(a).distance(b.into())))
-                    }
-                    _ => None,
-                })
-                .fold(0.0, f64::max);
-            let leaves = nodes.iter().filter(|node| node.is_leaf());
-            let leaf_edges: BTreeSet<_> =
-                edge_uses(leaves.map(|node| &node.mesh)).into_keys().collect();
-            // Every second node of level 1 as it is, the others as leaves.
-            let front: Vec<&Kept> = nodes
-                .iter()
-                .filter(|node| {
-                    let odd = node.child_path.first().is_some_and(|first| first % 2 == 1);
-                    if odd { node.level == 1 } else { node.is_leaf() }
-                })
-                .collect();
-            let mut errors: Vec<f64> = coarse.iter().map(|node| node.error).collect();
-            errors.sort_by(f64::total_cmp);
-            println!(
-                "| {name}, {} triangles | {borders:?} | {over} of {} | {worst:.2} | {skirt_triangles} | {} | {:.1} | {:.1} |",
-                piece.mesh.triangles.len(),
-                coarse.len(),
-                unsealed(&front, &leaf_edges, lattice),
-                if borders == BorderMode::Shared { widest * 1e3 } else { 0.0 },
-                errors[errors.len() / 2] * 1e3,
-            );
         }
     }
 }

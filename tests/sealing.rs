@@ -15,7 +15,7 @@ use common::rays::{Ray, Soup};
 use common::*;
 use glam::DVec3;
 use hlod::builder::border::skirt;
-use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
+use hlod::builder::hierarchy::{BorderMode, HierarchyOptions};
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::lattice::Lattice;
 use hlod::mesh::{Material, Mesh, PositionKey};
@@ -207,18 +207,15 @@ fn leaks_of_sheet(front: &Front, side: f64) -> [usize; 2] {
 fn every_option(borders: BorderMode) -> Vec<HierarchyOptions> {
     let mut all = Vec::new();
     for level_factor in [2, 4] {
-        for simplify_from in [SimplifyFrom::Original, SimplifyFrom::Children] {
-            for simplifier in [Simplifier::Qem, Simplifier::Clustering] {
-                all.push(HierarchyOptions {
-                    desired_tris: 150,
-                    level_factor,
-                    simplify_from,
-                    simplifier,
-                    borders,
-                    constants: all_nodes(),
-                    ..Default::default()
-                });
-            }
+        for simplifier in [Simplifier::Qem, Simplifier::Clustering] {
+            all.push(HierarchyOptions {
+                desired_tris: 150,
+                level_factor,
+                simplifier,
+                borders,
+                constants: all_nodes(),
+                ..Default::default()
+            });
         }
     }
     all
@@ -286,7 +283,7 @@ fn all_baked(materials: usize) -> BakeClasses {
 }
 
 fn always(classes: &BakeClasses) -> Option<BakePlan<'_>> {
-    Some(BakePlan { classes, always: Some(BakeReason::Asked) })
+    Some(BakePlan { classes, always: Some(BakeReason::Torn) })
 }
 
 #[test]

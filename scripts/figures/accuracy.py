@@ -21,13 +21,8 @@ from common import (
 # Name and options of each way to build; the defaults first.
 VARIANTS = [
     ("defaults", []),
-    ("from original", ["--simplify-from", "original"]),
     ("clustering", ["--simplifier", "clustering"]),
-    ("clustering, from original", ["--simplifier", "clustering", "--simplify-from", "original"]),
-    ("borders shared", ["--borders", "shared"]),
     ("borders locked", ["--borders", "locked"]),
-    ("seams kept", ["--seams", "keep"]),
-    ("all seams baked", ["--seams", "bake"]),
     ("900 triangles a node", ["--desired-tris", "900"]),
     ("5,000 triangles a node", ["--desired-tris", "5000"]),
 ]
@@ -35,7 +30,7 @@ UTM = "678016,5403456,400"
 # The share of the source's triangles at which ways are compared.
 SHARE = 0.1
 # Of the whole mesh in one piece: what a cut through a hierarchy is measured against.
-WHOLE = ["--blocks", "grid:100000000", "--level-factor", "16", "--simplify-from", "original"]
+WHOLE = ["--blocks", "grid:100000000", "--level-factor", "16"]
 
 
 def main():

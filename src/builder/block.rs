@@ -121,7 +121,7 @@ pub fn build_input(
     let of_tile = border.bounds.map(|_| Lattice::for_tile(model.bounds()));
     merge_untextured(&mut model);
     let HierarchyOptions { desired_tris, constants, .. } = &options.hierarchy;
-    let looks = Looks::new(&model, options.hierarchy.seams);
+    let looks = Looks::new(&model);
     let kinds = looks.kinds(&model.parts);
     let stitches = stages.time(Stage::Gather, || {
         let shared = border.positions();
@@ -367,7 +367,7 @@ impl Drafting<'_> {
             Resolutions::new(most.min(chunk.mesh.triangles.len()), &options.hierarchy);
         let shares: Vec<f64> = match options.hierarchy.borders {
             BorderMode::Locked => vec![1.0],
-            BorderMode::Shared | BorderMode::Skirts => {
+            BorderMode::Skirts => {
                 resolutions.factors().iter().map(|factor| 1.0 / factor.sqrt()).collect()
             }
         };

@@ -11,7 +11,7 @@ use crate::format::{Encoding, OutputDir};
 use crate::lattice::Lattice;
 use crate::mesh::{Mesh, Model, Part, UpAxis};
 use crate::texture::{
-    BakeClasses, BlockTextures, Seams, SharedTextures, TextureCache, TextureOptions, TexturePlan,
+    BakeClasses, BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan,
     TextureUse, texture_factors,
 };
 
@@ -42,12 +42,11 @@ pub struct Looks {
 
 impl Looks {
     /// Of a model whose untextured materials are merged.
-    pub fn new(model: &Model, seams: Seams) -> Self {
+    pub fn new(model: &Model) -> Self {
         let textures = TexturePlan::new(model);
         let is_cut_up = |material: u32| {
             let texture = textures.texture_of(material);
             texture.map(|texture| textures.texture_use(texture)) == Some(TextureUse::Atlas)
-                && seams != Seams::Keep
         };
         let classes = BakeClasses::new(&model.materials, is_cut_up);
         let is_textured = |material: u32| textures.texture_of(material).is_some();
@@ -108,7 +107,6 @@ impl<'a> BlockSetup<'a> {
         let texture_options = TextureOptions {
             jpeg_quality: options.jpeg_quality,
             max_atlas: options.max_atlas,
-            seams: options.hierarchy.seams,
             normals: options.normals,
             root_triangles: (mesh.triangles.len() as f64 / factors[0]) as usize,
         };

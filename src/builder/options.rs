@@ -113,9 +113,7 @@ impl BuildOptions {
             "desired_tris": hierarchy.desired_tris,
             "level_factor": hierarchy.level_factor,
             "simplifier": hierarchy.simplifier,
-            "simplify_from": hierarchy.simplify_from,
             "borders": hierarchy.borders,
-            "seams": hierarchy.seams,
             "texture_weight": shortest(hierarchy.weights.texture),
             "color_weight": shortest(hierarchy.weights.color),
             "up": self.up,
@@ -149,7 +147,6 @@ impl BuildOptions {
             tree: read(parameters, "tree")?,
             desired_tris: read(parameters, "desired_tris")?,
             level_factor: read(parameters, "level_factor")?,
-            simplify_from: read(parameters, "simplify_from")?,
             simplifier: read(parameters, "simplifier")?,
             borders: read(parameters, "borders")?,
             weights: AppearanceWeights {
@@ -157,7 +154,6 @@ impl BuildOptions {
                 color: read(parameters, "color_weight")?,
                 ..AppearanceWeights::default()
             },
-            seams: read(parameters, "seams")?,
             ..HierarchyOptions::default()
         };
         let blocks: String = read(parameters, "blocks")?;
@@ -227,9 +223,8 @@ pub fn same_nodes(one: &serde_json::Value, other: &serde_json::Value) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::builder::hierarchy::{BorderMode, SimplifyFrom, TreeShape};
+    use crate::builder::hierarchy::{BorderMode, TreeShape};
     use crate::builder::simplify::ladder::Simplifier;
-    use crate::texture::Seams;
 
     #[test]
     fn options_of_a_result_are_those_that_it_was_built_with() {
@@ -238,10 +233,8 @@ mod tests {
                 tree: TreeShape::Thesis,
                 desired_tris: 123,
                 level_factor: 7,
-                simplify_from: SimplifyFrom::Original,
                 simplifier: Simplifier::Clustering,
                 borders: BorderMode::Locked,
-                seams: Seams::Bake,
                 ..HierarchyOptions::default()
             },
             blocks: BlockMode::Grid(12.5),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::bake::classes::BakeClasses;
-use super::bake::plan::{BakePlan, BakeReason, Seams};
+use super::bake::plan::{BakePlan, BakeReason, bake_decision};
 use super::bake::source::Source;
 use super::bits::BitGrid;
 use super::cache::{Decoded, TextureCache};
@@ -27,23 +27,15 @@ pub struct TextureOptions {
     /// Longest side of an atlas, texels, 16–65535; default 4096. A leaf that needs more gets
     /// several pages, a coarser node a coarser atlas and a warning.
     pub max_atlas: u32,
-    /// Whether coarse nodes give up texture seams.
-    pub seams: Seams,
     /// True if triangles without a texture have normals.
     pub normals: bool,
-    /// Triangles of the block's root; seams are in the way where it has few for each chart.
+    /// Triangles of the block's root. Where it has few for each chart, coarse nodes are baked.
     pub root_triangles: usize,
 }
 
 impl Default for TextureOptions {
     fn default() -> Self {
-        Self {
-            jpeg_quality: 85,
-            max_atlas: 4096,
-            seams: Seams::Keep,
-            normals: true,
-            root_triangles: 900,
-        }
+        Self { jpeg_quality: 85, max_atlas: 4096, normals: true, root_triangles: 900 }
     }
 }
 
@@ -195,8 +187,7 @@ impl<'a> BlockTextures<'a> {
 
     /// Keeps what coarse nodes may be baked from.
     fn prepare_bake(&mut self, mesh: &Mesh, usage: &Usage) {
-        let wanted = self.options.seams != Seams::Keep;
-        if !wanted || self.steps.len() < 2 || self.used_texels == 0 {
+        if self.steps.len() < 2 || self.used_texels == 0 {
             return;
         }
         let atlas = |material: u32| {
@@ -218,10 +209,8 @@ impl<'a> BlockTextures<'a> {
             .collect();
         charts.sort_unstable();
         charts.dedup();
-        let root_triangles = self.options.root_triangles;
-        let Some(always) = self.options.seams.decide(charts.len(), root_triangles) else {
-            return;
-        };
+        let decision = bake_decision(charts.len(), self.options.root_triangles);
+        let Some(always) = decision else { return };
         let source = Source::new(mesh, &classes, |triangle| {
             let (texture, source) = atlas(mesh.triangle_material(triangle))?;
             let chart = usage.charts.of_vertex[triangle[0] as usize];

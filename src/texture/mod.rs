@@ -39,7 +39,7 @@ mod split;
 mod tests;
 mod wrapped_page;
 
-pub use bake::{BakeClasses, BakePlan, BakeReason, BakedMesh, Seams};
+pub use bake::{BakeClasses, BakePlan, BakeReason, BakedMesh};
 pub use block::{BlockTextures, TextureOptions, texture_factors};
 pub use cache::TextureCache;
 #[cfg(feature = "render")]

@@ -58,10 +58,7 @@ fn help_names_every_option_with_its_unit_and_range() {
         "[default: 2000]",
         "qem",
         "clustering",
-        "original",
-        "children",
         "locked",
-        "shared",
         "skirts",
         "1-100",
         "[default: 85]",
@@ -107,8 +104,7 @@ fn bad_usage_is_refused_with_the_range() {
         (&["--jpeg-quality", "101", "good.obj", "out"], &["JPEG quality is 101", "1 to 100"]),
         (&["--max-atlas", "15", "good.obj", "out"], &["largest atlas is 15", "16 to 65535"]),
         (&["--simplifier", "magic", "good.obj", "out"], &["magic", "qem, clustering"]),
-        (&["--borders", "none", "good.obj", "out"], &["locked, shared, skirts"]),
-        (&["--simplify-from", "x", "good.obj", "out"], &["original, children"]),
+        (&["--borders", "none", "good.obj", "out"], &["locked, skirts"]),
         (&["--up", "x", "good.obj", "out"], &["y, z"]),
         (&["--threads", "100000", "good.obj", "out"], &["100000 threads", "0 to 1024"]),
         (&["inspect"], &["OUT"]),
@@ -382,7 +378,7 @@ fn a_reader_that_stops_reading_is_no_failure() {
     write_city(folder.path(), &small_city());
     hlod_build()
         .current_dir(&folder)
-        .args(["--desired-tris", "20", "--borders", "shared", "-q", "city.obj", "out"])
+        .args(["--desired-tris", "20", "-q", "city.obj", "out"])
         .assert()
         .success();
     let mut child = Process::new(assert_cmd::cargo::cargo_bin("hlod-build"))

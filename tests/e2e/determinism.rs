@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use hlod::builder::BuildOptions;
-use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
+use hlod::builder::hierarchy::{BorderMode, HierarchyOptions};
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::builder::threads::with_threads;
 
@@ -15,17 +15,14 @@ use crate::support::{build_with, run_build};
 /// Every way to make the tree.
 fn ways() -> Vec<HierarchyOptions> {
     let mut ways = Vec::new();
-    for simplify_from in [SimplifyFrom::Original, SimplifyFrom::Children] {
-        for simplifier in [Simplifier::Qem, Simplifier::Clustering] {
-            for borders in [BorderMode::Locked, BorderMode::Shared, BorderMode::Skirts] {
-                ways.push(HierarchyOptions {
-                    desired_tris: 200,
-                    simplify_from,
-                    simplifier,
-                    borders,
-                    ..HierarchyOptions::default()
-                });
-            }
+    for simplifier in [Simplifier::Qem, Simplifier::Clustering] {
+        for borders in [BorderMode::Locked, BorderMode::Skirts] {
+            ways.push(HierarchyOptions {
+                desired_tris: 200,
+                simplifier,
+                borders,
+                ..HierarchyOptions::default()
+            });
         }
     }
     ways

@@ -90,17 +90,8 @@ fn a_tree_of_the_default_way() {
 #[test]
 fn a_tree_of_the_thesis_way() {
     check(
-        "tiny_city_original_locked",
-        &[
-            "--desired-tris",
-            "150",
-            "--tree",
-            "thesis",
-            "--simplify-from",
-            "original",
-            "--borders",
-            "locked",
-        ],
+        "tiny_city_thesis_locked",
+        &["--desired-tris", "150", "--tree", "thesis", "--borders", "locked"],
     );
 }
 

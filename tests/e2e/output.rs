@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use hlod::builder::BuildOptions;
-use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
+use hlod::builder::hierarchy::{BorderMode, HierarchyOptions};
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::city::{City, CityOptions, TextureSize, TileCode};
 use hlod::format::{NODES_DIR, NodeImageData, NodeMesh, TEXTURES_DIR, file_crc};
@@ -55,11 +55,10 @@ impl Case {
 }
 
 fn cases() -> Vec<Case> {
-    let original = |borders| BuildOptions {
+    let locked = BuildOptions {
         hierarchy: HierarchyOptions {
             desired_tris: 300,
-            simplify_from: SimplifyFrom::Original,
-            borders,
+            borders: BorderMode::Locked,
             ..HierarchyOptions::default()
         },
         ..BuildOptions::default()
@@ -77,8 +76,7 @@ fn cases() -> Vec<Case> {
     let bare = CityOptions { texture: TextureSize::None, ..small_city() };
     vec![
         Case::new("city", &options(300), city),
-        Case::new("city from the original", &original(BorderMode::Skirts), city),
-        Case::new("city with locked borders", &original(BorderMode::Locked), city),
+        Case::new("city with locked borders", &locked, city),
         Case::new("city by clustering", &clustering, city),
         Case::new("far city", &options(300), |folder| write_city(folder, &far)),
         Case::new("bare city", &options(300), |folder| write_city(folder, &bare)),

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use hlod::builder::blocks::plan::BlockMode;
-use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom};
+use hlod::builder::hierarchy::{BorderMode, HierarchyOptions};
 use hlod::builder::progress::Silent;
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::builder::{BuildOptions, build};
@@ -138,9 +138,8 @@ fn random_options(random: &mut Random) -> BuildOptions {
         hierarchy: HierarchyOptions {
             desired_tris: random.pick(&[1, 4, 10, 10, 40, 40, 900]),
             level_factor: random.pick(&[2, 3, 4, 7, 64]),
-            simplify_from: random.pick(&[SimplifyFrom::Original, SimplifyFrom::Children]),
             simplifier: random.pick(&[Simplifier::Qem, Simplifier::Clustering]),
-            borders: random.pick(&[BorderMode::Locked, BorderMode::Shared, BorderMode::Skirts]),
+            borders: random.pick(&[BorderMode::Locked, BorderMode::Skirts]),
             ..HierarchyOptions::default()
         },
         blocks: random.pick(&[

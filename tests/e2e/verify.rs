@@ -29,7 +29,7 @@ pub struct Sound {
 pub static SOUND: LazyLock<Sound> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let source = write_city(folder.path(), &city());
-    for borders in ["locked", "shared", "skirts"] {
+    for borders in ["locked", "skirts"] {
         hlod_build()
             .current_dir(&folder)
             .args(["--quiet", "--borders", borders, "--desired-tris", "300", "city.obj", borders])

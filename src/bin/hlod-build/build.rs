@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use clap::{Args, ValueEnum};
 use hlod::builder::blocks::plan::BlockMode;
-use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, SimplifyFrom, TreeShape};
+use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, TreeShape};
 use hlod::builder::progress::Progress;
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::builder::threads::with_threads;
@@ -14,7 +14,6 @@ use hlod::bytes::Bytes;
 use hlod::mesh::UpAxis;
 use hlod::place::{Place, Placement};
 use hlod::report::build_summary;
-use hlod::texture::Seams;
 use hlod::{Error, Result};
 use indicatif::ProgressBar;
 
@@ -48,18 +47,10 @@ pub struct BuildArgs {
     /// How coarse nodes are simplified
     #[arg(long, value_enum, default_value_t = SimplifierArg::Qem, help_heading = "Hierarchy")]
     simplifier: SimplifierArg,
-    /// What coarse nodes are simplified from: `children`, the level below, or `original`, the source,
-    /// as in Lakhia's thesis; slower
-    #[arg(long, value_enum, default_value_t = FromArg::Children, help_heading = "Hierarchy")]
-    simplify_from: FromArg,
     /// How borders on cutting planes are simplified: `skirts` identically on both sides, with strips
-    /// over the gaps between levels; `shared` without the strips; `locked` not at all
+    /// over the gaps between levels; `locked` not at all
     #[arg(long, value_enum, default_value_t = BordersArg::Skirts, help_heading = "Hierarchy")]
     borders: BordersArg,
-    /// Texture seams of coarse nodes: `keep` preserves them, `bake` replaces the texture by one baked
-    /// from the source, `auto` bakes where seams prevent simplification
-    #[arg(long, value_enum, default_value_t = SeamsArg::Auto, help_heading = "Hierarchy")]
-    seams: SeamsArg,
     /// Up axis, where the input does not say [default: the format's, else guessed from the shape]
     #[arg(long, value_enum, help_heading = "Hierarchy")]
     up: Option<UpArg>,
@@ -155,16 +146,6 @@ enum CompressArg {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum SeamsArg {
-    /// Preserve seams and source textures
-    Keep,
-    /// Bake where seams prevent simplification
-    Auto,
-    /// Bake every coarse node
-    Bake,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
 enum TreeArg {
     /// As deep as the geometry needs, with even ratios and cuts that balance triangles
     Balanced,
@@ -181,15 +162,8 @@ enum SimplifierArg {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum FromArg {
-    Original,
-    Children,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
 enum BordersArg {
     Locked,
-    Shared,
     Skirts,
 }
 
@@ -209,22 +183,12 @@ impl BuildArgs {
                 },
                 desired_tris: self.desired_tris,
                 level_factor: self.level_factor,
-                simplify_from: match self.simplify_from {
-                    FromArg::Original => SimplifyFrom::Original,
-                    FromArg::Children => SimplifyFrom::Children,
-                },
                 simplifier: match self.simplifier {
                     SimplifierArg::Qem => Simplifier::Qem,
                     SimplifierArg::Clustering => Simplifier::Clustering,
                 },
-                seams: match self.seams {
-                    SeamsArg::Keep => Seams::Keep,
-                    SeamsArg::Auto => Seams::Auto,
-                    SeamsArg::Bake => Seams::Bake,
-                },
                 borders: match self.borders {
                     BordersArg::Locked => BorderMode::Locked,
-                    BordersArg::Shared => BorderMode::Shared,
                     BordersArg::Skirts => BorderMode::Skirts,
                 },
                 ..Default::default()

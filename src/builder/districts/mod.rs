@@ -276,9 +276,7 @@ impl Level<'_> {
         let hierarchy = &self.target.options.hierarchy;
         let share = match hierarchy.borders {
             BorderMode::Locked => 1.0,
-            BorderMode::Shared | BorderMode::Skirts => {
-                1.0 / f64::from(hierarchy.level_factor).sqrt()
-            }
+            BorderMode::Skirts => 1.0 / f64::from(hierarchy.level_factor).sqrt(),
         };
         KeepRule {
             shares: vec![share, 1.0],
@@ -317,7 +315,7 @@ impl Level<'_> {
             let Members { mut model, skirts } = members;
             merge_untextured(&mut model);
             // What thinned on both sides of a border of members, but not alike, had skirts.
-            let looks = Looks::new(&model, hierarchy.seams);
+            let looks = Looks::new(&model);
             let kinds = looks.kinds(&model.parts);
             let between = borders.map(|borders| {
                 let goes_on = |edge: &OpenEdge| edge.ends.iter().all(|end| borders.has(*end));

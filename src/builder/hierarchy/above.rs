@@ -54,7 +54,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
                 spans.dedup();
                 spans
             }
-            BorderMode::Locked | BorderMode::Shared => Vec::new(),
+            BorderMode::Locked => Vec::new(),
         };
         let Widened { path, spans } = Widened::by(&skirts, &path, spans);
         let error = SurfaceError { bound, ..SurfaceError::default() };

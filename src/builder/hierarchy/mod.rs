@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 pub use self::above::Below;
 pub use self::node::{Forest, NodeDraft, NodeSink, Tree};
-pub use self::options::{BorderMode, HierarchyOptions, SimplifyFrom, TreeShape};
+pub use self::options::{BorderMode, HierarchyOptions, TreeShape};
 pub use self::outline::LeftOut;
 pub use self::shape::Resolutions;
 
@@ -124,9 +124,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             })
             .collect();
         let all_leaves = children.iter().all(|(_, plan)| *plan == NodePlan::Leaf);
-        let from_original = all_leaves
-            || self.options.simplify_from == SimplifyFrom::Original
-            || has_many_bodies(&mesh, budget, &self.bodies());
+        let from_original = all_leaves || has_many_bodies(&mesh, budget, &self.bodies());
         if from_original {
             let from_original = || {
                 let source = self.original(mesh, border, stitches, moved, &node);
@@ -208,7 +206,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         mesh.triangles.append(&mut stitches);
         let spans = match self.options.borders {
             BorderMode::Skirts => original_spans(&mesh, &border, node.path),
-            BorderMode::Locked | BorderMode::Shared => Vec::new(),
+            BorderMode::Locked => Vec::new(),
         };
         let error = SurfaceError::everywhere(moved);
         NodeSurface { mesh, border, spans, original, moved, error, baked: false }

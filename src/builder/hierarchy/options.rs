@@ -4,20 +4,6 @@ use crate::builder::constants::Constants;
 use crate::builder::cut::split::CutTolerance;
 use crate::builder::simplify::ladder::{AppearanceWeights, Simplifier};
 use crate::builder::simplify::simplified::LadderStep;
-use crate::texture::Seams;
-
-/// What a coarse node is simplified from.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
-)]
-#[serde(rename_all = "lowercase")]
-pub enum SimplifyFrom {
-    /// The original triangles of its chunk, as the thesis does it.
-    Original,
-    /// Its children's results: every triangle is touched about once, not once a level.
-    #[default]
-    Children,
-}
 
 /// What happens to vertices on cutting planes.
 #[derive(
@@ -25,11 +11,9 @@ pub enum SimplifyFrom {
 )]
 #[serde(rename_all = "lowercase")]
 pub enum BorderMode {
-    /// None is ever removed: no gaps, and a large part of every coarse node's budget.
+    /// None is removed: no gaps, at the price of a large part of every coarse node's budget.
     Locked,
-    /// Thinned alike on both sides; gaps between different levels stay open.
-    Shared,
-    /// Thinned alike on both sides, and the gaps between different levels closed by skirts.
+    /// They are simplified identically on both sides; skirts close the gaps between levels.
     #[default]
     Skirts,
 }
@@ -59,16 +43,12 @@ pub struct HierarchyOptions {
     pub desired_tris: u32,
     /// Ratio of triangles and texels between levels (`c_levelFactor`), at least 2.
     pub level_factor: u32,
-    /// See [`SimplifyFrom`].
-    pub simplify_from: SimplifyFrom,
     /// See [`Simplifier`].
     pub simplifier: Simplifier,
     /// See [`BorderMode`].
     pub borders: BorderMode,
     /// See [`AppearanceWeights`].
     pub weights: AppearanceWeights,
-    /// See [`Seams`].
-    pub seams: Seams,
     /// See [`CutTolerance`].
     pub tolerance: CutTolerance,
     /// A step of the ladder that is not tried, to measure what it is worth; a result does not say
@@ -84,11 +64,9 @@ impl Default for HierarchyOptions {
             tree: TreeShape::default(),
             desired_tris: 2000,
             level_factor: 4,
-            simplify_from: SimplifyFrom::default(),
             simplifier: Simplifier::default(),
             borders: BorderMode::default(),
             weights: AppearanceWeights::default(),
-            seams: Seams::default(),
             tolerance: CutTolerance::default(),
             without: None,
             constants: Constants::default(),

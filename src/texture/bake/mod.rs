@@ -25,4 +25,4 @@ mod tile;
 
 pub use baked_mesh::BakedMesh;
 pub use classes::BakeClasses;
-pub use plan::{BakePlan, BakeReason, Seams};
+pub use plan::{BakePlan, BakeReason};

@@ -4,25 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::classes::BakeClasses;
 
-/// What happens to texture seams in coarse nodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Seams {
-    /// Simplification works around them.
-    Keep,
-    /// They are given up where they are in the way: see [`BakeReason`].
-    #[default]
-    Auto,
-    /// They are given up in every coarse node.
-    Bake,
-}
-
 /// Why a node was given a texture of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BakeReason {
-    /// It was asked for.
-    Asked,
     /// Its block's texture is in so many charts that the root has few triangles for each.
     Torn,
     /// Collapse within the seams leaves more triangles than the node may have.
@@ -35,7 +20,6 @@ impl BakeReason {
     /// For reports.
     pub fn describe(self) -> &'static str {
         match self {
-            Self::Asked => "texture baked, as asked for",
             Self::Torn => "texture baked, as its block's is in many small charts",
             Self::Seams => "texture baked, as seams kept the node from its triangle budget",
             Self::Below => "texture baked, as a node below has one that is",
@@ -60,17 +44,13 @@ pub struct BakePlan<'a> {
     pub always: Option<BakeReason>,
 }
 
-impl Seams {
-    /// Whether a block of so many charts whose root may have so many triangles keeps what it needs
-    /// for baking, and why all of it is baked at once.
-    pub(crate) fn decide(self, charts: usize, triangles: usize) -> Option<Option<BakeReason>> {
-        match self {
-            Self::Keep => None,
-            Self::Bake => Some(Some(BakeReason::Asked)),
-            Self::Auto if charts * TORN > triangles => Some(Some(BakeReason::Torn)),
-            Self::Auto if charts * DOUBTFUL > triangles => Some(None),
-            Self::Auto => None,
-        }
+/// Whether a block of so many charts, whose root may have so many triangles, keeps what baking
+/// needs, and why all of its coarse nodes are baked.
+pub(crate) fn bake_decision(charts: usize, triangles: usize) -> Option<Option<BakeReason>> {
+    if charts * TORN > triangles {
+        Some(Some(BakeReason::Torn))
+    } else {
+        (charts * DOUBTFUL > triangles).then_some(None)
     }
 }
 
@@ -80,10 +60,8 @@ mod tests {
 
     #[test]
     fn blocks_are_judged_by_the_triangles_that_their_root_has_for_a_chart() {
-        assert_eq!(Seams::Auto.decide(373, 900), Some(Some(BakeReason::Torn)));
-        assert_eq!(Seams::Auto.decide(30, 900), Some(None));
-        assert_eq!(Seams::Auto.decide(7, 900), None);
-        assert_eq!(Seams::Keep.decide(373, 900), None);
-        assert_eq!(Seams::Bake.decide(1, 900), Some(Some(BakeReason::Asked)));
+        assert_eq!(bake_decision(373, 900), Some(Some(BakeReason::Torn)));
+        assert_eq!(bake_decision(30, 900), Some(None));
+        assert_eq!(bake_decision(7, 900), None);
     }
 }

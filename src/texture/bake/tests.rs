@@ -10,7 +10,7 @@ use crate::format::{NodeImageData, NodeMesh};
 use crate::mesh::{Group, Material, Mesh, Model, Part, TextureData, TextureSource};
 use crate::random::Random;
 use crate::texture::{
-    AppendedSkirts, BlockTextures, Seams, SharedTextures, TextureCache, TextureOptions, TexturePlan,
+    AppendedSkirts, BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan,
 };
 
 /// A surface over a grid of `side` by `side` squares, without texture.
@@ -175,7 +175,7 @@ fn bake(model: &Model, mesh: &Mesh, coarse: &Mesh) -> NodeMesh {
     let plan = TexturePlan::new(model);
     let shared = SharedTextures::new();
     let cache = TextureCache::new(model, &plan, [[0u32]]);
-    let options = TextureOptions { jpeg_quality: 100, seams: Seams::Bake, ..Default::default() };
+    let options = TextureOptions { jpeg_quality: 100, root_triangles: 0, ..Default::default() };
     let block = BlockTextures::prepare(&cache, &shared, mesh, &[16.0, 4.0, 1.0], options);
     let baked = block.bake(coarse, 1).expect("bakes");
     block.baked_node_mesh(&baked, &AppendedSkirts::default(), 1, [0.0; 3]).expect("builds").mesh
