@@ -27,7 +27,6 @@ FRONTS = (0.15, 0.6)
 TRIED = {
     ("blocks", "large_group"): (100, 1600),
     ("tree", "last_step_tolerance"): (1.0, 4.0),
-    ("tree", "shrinking"): (0.34, 1.0),
     ("cut", "shortest_side"): (0.1, 0.6),
     ("cut", "least_share"): (0.25, 0.9),
     ("cut", "uneven_triangles"): (2.0, 32.0),

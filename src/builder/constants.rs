@@ -86,16 +86,11 @@ pub struct TreeConstants {
     /// others, 1 or more: cuts are not perfectly even, and another level for a few triangles more
     /// would be of tiny nodes.
     pub last_step_tolerance: f64,
-    /// A chunk that is at the last resolution but one is cut again where the pieces of a node
-    /// shrink by at least this power of their number, 0–1. Pieces of a surface shrink by its first
-    /// power, those of triangles that reach all through a volume by its cube root: these would be
-    /// cut for ever.
-    pub shrinking: f64,
 }
 
 impl Default for TreeConstants {
     fn default() -> Self {
-        Self { last_step_tolerance: 2.0, shrinking: 0.5 }
+        Self { last_step_tolerance: 2.0 }
     }
 }
 
@@ -149,9 +144,6 @@ pub struct BorderConstants {
     /// surface nothing else counts, but the wider a polyline swings there, the wider are its
     /// skirts.
     pub line_weight: f64,
-    /// Longer chords are measured at so many of their vertices, 1 or more: time stays proportional
-    /// to vertices.
-    pub chord_samples: usize,
     /// A triangle is taken for a skirt rather than a rectangle where it is at most so many times as
     /// high, 1 or more. With twice the height it has the rectangle's area.
     pub triangle_height: f64,
@@ -175,7 +167,6 @@ impl Default for BorderConstants {
         Self {
             triangles_per_vertex: 24.0,
             line_weight: 0.5,
-            chord_samples: 64,
             triangle_height: 2.2,
             overhang: 0.1,
             overhang_heights: 4.0,
@@ -191,13 +182,9 @@ impl Default for BorderConstants {
 #[serde(default, deny_unknown_fields)]
 pub struct SimplifyConstants {
     /// Edge collapse that moves the surface by more than this share of the side of a square as
-    /// large as a triangle may have is compared with other ways, 0 or more: it may have worn away
-    /// what else would be kept.
+    /// large as a triangle may have is compared with the other methods, 0 or more: it may have removed
+    /// what another method keeps.
     pub doubtful: f64,
-    /// Where parts are large, vertex clustering is among these from this share on.
-    pub doubtful_connected: f64,
-    /// Parts are large that have so many triangles on average.
-    pub scattered_part: usize,
     /// Up to this share of faces that turn or go leaves edge collapse as free as it was, 0–1. A
     /// closed surface that folded flat somewhere on a finer level has two faces in one place there;
     /// both stay, and it stays closed.
@@ -209,13 +196,7 @@ pub struct SimplifyConstants {
 
 impl Default for SimplifyConstants {
     fn default() -> Self {
-        Self {
-            doubtful: 0.1,
-            doubtful_connected: 0.2,
-            scattered_part: 300,
-            few_faces: 0.02,
-            far_part: 1.0,
-        }
+        Self { doubtful: 0.1, few_faces: 0.02, far_part: 1.0 }
     }
 }
 

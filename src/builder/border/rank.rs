@@ -143,6 +143,9 @@ impl Ord for Candidate {
     }
 }
 
+/// Vertices at which a longer chord is measured: time stays proportional to vertices.
+const CHORD_SAMPLES: usize = 64;
+
 /// A polyline that becomes shorter.
 struct Thinning<'a> {
     line: &'a Polyline,
@@ -156,8 +159,6 @@ struct Thinning<'a> {
     left: usize,
     /// As few may be.
     least: usize,
-    /// See [`BorderConstants`].
-    chord_samples: usize,
 }
 
 impl<'a> Thinning<'a> {
@@ -179,7 +180,6 @@ impl<'a> Thinning<'a> {
             costs: vec![0.0; count],
             left: count.saturating_sub(2),
             least: if is_loop { 2 } else { 0 },
-            chord_samples: constants.chord_samples,
         }
     }
 
@@ -202,7 +202,7 @@ impl<'a> Thinning<'a> {
             (self.line.points[from], self.line.points[to] - self.line.points[from]);
         let squared = along.length_squared();
         let inner = to - from - 1;
-        let samples = inner.min(self.chord_samples);
+        let samples = inner.min(CHORD_SAMPLES);
         let (mut cost, mut farthest) = (0.0, 0f64);
         for sample in 0..samples {
             let at = from + 1 + sample * inner / samples;

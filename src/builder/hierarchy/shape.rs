@@ -128,8 +128,9 @@ impl Resolutions {
         let share = share.round() as usize;
         if next >= self.last() {
             let most = self.constants.last_step_tolerance * self.level_factor.sqrt();
-            let shrunk =
-                parent.triangles as f64 / libm::pow(self.level_factor, self.constants.shrinking);
+            // Pieces of a surface shrink by their number, those of triangles that extend through a volume by
+            // its cube root: these would be cut without end.
+            let shrunk = parent.triangles as f64 / self.level_factor.sqrt();
             let leaf = ratio < most || triangles as f64 > shrunk;
             let coarse = || self.coarse(triangles, parent.resolution, share);
             return if leaf { NodePlan::Leaf } else { coarse() };

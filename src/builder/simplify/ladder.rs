@@ -28,8 +28,8 @@ use crate::builder::simplify::cluster::cluster;
 pub use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::builder::simplify::collapse::collapse;
 use crate::builder::simplify::compact::compact;
-use crate::builder::simplify::connected::Connected;
 use crate::builder::simplify::far_parts::keep_far_parts;
+use crate::builder::simplify::one_sheet::is_one_sheet;
 use crate::builder::simplify::orient::{has_duplicate_faces, oriented};
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::mesh::{Mesh, UpAxis};
@@ -149,14 +149,11 @@ fn nearest(
     let is_unfit =
         best.mesh.triangles.len() > limit || has_duplicate_faces(&source.mesh, rules.few_faces);
     if is_unfit || best.error > rules.doubtful * share {
-        let connected = Connected::of(&source.mesh, locked);
-        // Over one sheet without seams it does what collapse did.
-        if tries(LadderStep::Prune) && (connected.parts > 1 || connected.has_seams) {
+        // Over one sheet it does what collapse did.
+        if tries(LadderStep::Prune) && !is_one_sheet(&source.mesh, locked) {
             candidates.push(collapsed(LadderStep::Prune));
         }
-        let is_scattered = source.mesh.triangles.len() < connected.parts * rules.scattered_part;
-        let is_far = is_unfit || is_scattered || best.error > rules.doubtful_connected * share;
-        if tries(LadderStep::Clustering) && is_far {
+        if tries(LadderStep::Clustering) {
             candidates.push(clustered(&source.mesh, &source.border, locked, target));
         }
         if tries(LadderStep::Oriented) {
