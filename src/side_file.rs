@@ -55,7 +55,7 @@ fn too_large(bytes: u64, most_bytes: u64) -> io::Error {
 
 /// Makes what is no readable file in `folder`, for tests: a pipe, a link to a device, a folder, a
 /// link to itself and a sparse file of more than [`MOST_BYTES`], each with what messages say of it.
-#[cfg(test)]
+#[cfg(all(test, unix))]
 pub(crate) fn make_faulty_files(folder: &Path) -> [(&'static str, &'static str); 5] {
     use std::os::unix::fs::symlink;
     let is_made = std::process::Command::new("mkfifo").arg(folder.join("pipe")).status();
@@ -73,7 +73,7 @@ pub(crate) fn make_faulty_files(folder: &Path) -> [(&'static str, &'static str);
     ]
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
 

@@ -524,7 +524,8 @@ fn flush(folder: &Path) -> io::Result<()> {
         if entry.file_type()?.is_dir() {
             flush(&entry.path())?;
         } else {
-            File::open(entry.path())?.sync_all()?;
+            // Windows flushes files that are open for writing alone.
+            File::options().write(true).open(entry.path())?.sync_all()?;
         }
     }
     Ok(())

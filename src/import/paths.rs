@@ -1,9 +1,7 @@
 //! Finds the files that a model names, also when the names come from another machine.
 
 use std::collections::BTreeMap;
-use std::ffi::OsStr;
 use std::io;
-use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use encoding_rs::Encoding;
@@ -63,7 +61,7 @@ impl Finder {
         let slashed = with_slashes(&unescaped(name));
         let base_name = components(&slashed).last().map(|name| name.to_vec());
         let names = [Some(slashed.clone()), base_name].into_iter().flatten();
-        names.map(|name| self.folder.join(OsStr::from_bytes(&name))).collect()
+        names.map(|name| self.folder.join(path_of(&name))).collect()
     }
 
     /// Says of a name for which there is no file that it was not found, or what is there instead.
@@ -107,7 +105,7 @@ impl Finder {
 
     /// The file at `name` as it is written, relative to the model's folder.
     pub(super) fn as_written(&self, name: &[u8]) -> Option<PathBuf> {
-        let file = self.folder.join(OsStr::from_bytes(name));
+        let file = self.folder.join(path_of(name));
         (is_possible(name) && side_file::check(&file).is_ok()).then_some(file)
     }
 
@@ -183,7 +181,7 @@ impl Listing {
                 Err(_) if path.is_dir() => &mut listing.folders,
                 Err(_) => continue,
             };
-            entries.entry(folded(name.as_bytes())).or_insert(path);
+            entries.entry(folded(name.as_encoded_bytes())).or_insert(path);
         }
         listing
     }
@@ -193,6 +191,19 @@ impl Listing {
         let folders = self.folders.iter().filter(move |(name, _)| is_usual(name));
         folders.map(|(_, folder)| folder.clone())
     }
+}
+
+/// The path that a model's bytes mean.
+#[cfg(unix)]
+fn path_of(name: &[u8]) -> &Path {
+    use std::os::unix::ffi::OsStrExt;
+    Path::new(std::ffi::OsStr::from_bytes(name))
+}
+
+/// The path that a model's bytes mean, on systems whose file names are Unicode.
+#[cfg(not(unix))]
+fn path_of(name: &[u8]) -> PathBuf {
+    String::from_utf8_lossy(name).into_owned().into()
 }
 
 /// False of what no file is called.
@@ -247,6 +258,7 @@ mod tests {
         }
     }
 
+    #[cfg(target_os = "linux")]
     #[test]
     fn names_in_other_encodings_normal_forms_and_case_are_found() {
         let folder = tempfile::tempdir().unwrap();
@@ -255,14 +267,14 @@ mod tests {
         let gbk = encoding_rs::GBK.encode("墙.png").0.into_owned();
         for name in ["大地.png".as_bytes(), "cafe\u{301}.png".as_bytes(), "my wall.png".as_bytes()]
         {
-            std::fs::write(root.join(OsStr::from_bytes(name)), "").unwrap();
+            std::fs::write(root.join(path_of(name)), "").unwrap();
         }
         std::fs::write(root.join("Bilder/u\u{308}ber.png"), "").unwrap();
-        std::fs::write(root.join(OsStr::from_bytes(&gbk)), "").unwrap();
+        std::fs::write(root.join(path_of(&gbk)), "").unwrap();
         let mut finder = Finder::new(&root.join("city.obj"));
         let mut found = |name: &[u8]| {
             let found = finder.find(name)?;
-            Some(found.strip_prefix(root).unwrap().as_os_str().as_bytes().to_vec())
+            Some(found.strip_prefix(root).unwrap().as_os_str().as_encoded_bytes().to_vec())
         };
         for (name, expected) in [
             ("Caf\u{e9}.PNG", "cafe\u{301}.png"),

@@ -858,6 +858,7 @@ fn normals_that_cannot_be_are_dropped_and_counted() {
     assert_eq!((flat, model.warnings.is_empty()), (vec![None], true));
 }
 
+#[cfg(unix)]
 #[test]
 fn buffers_that_are_no_files_are_refused_and_images_warned_of() {
     let folder = tempfile::tempdir().unwrap();

@@ -867,6 +867,7 @@ fn mutated_libraries_give_a_model() {
     }
 }
 
+#[cfg(unix)]
 #[test]
 fn libraries_and_textures_that_are_no_files_are_warned_of_like_missing_ones() {
     let folder = folder_with(&[("a.mtl", ""), ("large.mtl", "")]);
@@ -897,6 +898,7 @@ fn libraries_and_textures_that_are_no_files_are_warned_of_like_missing_ones() {
     assert!(warnings(&model)[0].0.contains("expected at most 256 MiB"), "{:?}", warnings(&model));
 }
 
+#[cfg(unix)]
 #[test]
 fn a_model_that_is_no_file_is_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -190,9 +190,7 @@ fn each_chunk(path: &Path, mut add: impl FnMut(Parsed) -> Result<()> + Send) -> 
 fn check_space(path: &Path, dir: &Path) -> Result<()> {
     let bytes = std::fs::metadata(path).map_or(0, |facts| facts.len());
     let needed = (bytes as f64 * DISK) as u64;
-    let Ok(disk) = rustix::fs::statvfs(dir) else { return Ok(()) };
-    let free = disk.f_bavail.saturating_mul(disk.f_frsize);
-    if free < needed {
+    if let Some(free) = free_bytes(dir).filter(|free| *free < needed) {
         return Err(Error::output(
             dir,
             format!(
@@ -205,6 +203,18 @@ fn check_space(path: &Path, dir: &Path) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// The bytes that may still be written to the disk of a folder; `None` if the system does not say.
+#[cfg(unix)]
+fn free_bytes(folder: &Path) -> Option<u64> {
+    let disk = rustix::fs::statvfs(folder).ok()?;
+    Some(disk.f_bavail.saturating_mul(disk.f_frsize))
+}
+
+#[cfg(not(unix))]
+fn free_bytes(_folder: &Path) -> Option<u64> {
+    None
 }
 
 /// Why a file cannot be divided.

@@ -1,9 +1,8 @@
 //! A list on disk that grows at its end and is read wherever one likes.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::marker::PhantomData;
-use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 use bytemuck::Pod;
@@ -46,7 +45,8 @@ impl<T: Pod> Spilled<T> {
         self.tail.push(element);
         if self.tail.len() == PAGE {
             let at = self.written * size_of::<T>();
-            self.file.write_all_at(bytemuck::cast_slice(&self.tail), at as u64)?;
+            self.file.seek(SeekFrom::Start(at as u64))?;
+            self.file.write_all(bytemuck::cast_slice(&self.tail))?;
             self.written += PAGE;
             self.tail.clear();
         }
@@ -72,7 +72,8 @@ impl<T: Pod> Spilled<T> {
         }
         let mut elements = held.take().map_or_else(|| vec![T::zeroed(); PAGE], |(_, page)| page);
         let at = page * PAGE * size_of::<T>();
-        self.file.read_exact_at(bytemuck::cast_slice_mut(&mut elements), at as u64)?;
+        self.file.seek(SeekFrom::Start(at as u64))?;
+        self.file.read_exact(bytemuck::cast_slice_mut(&mut elements))?;
         let element = elements.get(within).copied();
         *held = Some((page, elements));
         Ok(element)

@@ -1,8 +1,7 @@
 //! The text of a tile: an OBJ of its own, but for what stands beside the file that it is of.
 
 use std::fs::File;
-use std::io::{self, Read, Write};
-use std::os::unix::fs::FileExt;
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
@@ -123,13 +122,14 @@ impl TileText {
     }
 
     /// Writes what is not in the file yet to its end, which is at `end`.
-    pub fn flush(&mut self, names: &Names, file: &File, end: &mut u64) -> io::Result<()> {
+    pub fn flush(&mut self, names: &Names, mut file: &File, end: &mut u64) -> io::Result<()> {
         if self.faces.is_empty() {
             return Ok(());
         }
         let text = self.text(names)?;
         let length = u32::try_from(text.len()).map_err(io::Error::other)?;
-        file.write_all_at(&text, *end)?;
+        file.seek(SeekFrom::Start(*end))?;
+        file.write_all(&text)?;
         self.pieces.push((*end, length));
         *end += u64::from(length);
         self.corners.clear();
@@ -214,7 +214,7 @@ impl Read for TileReader<'_> {
         }
         let (at, left) = &mut self.piece;
         let most = into.len().min(*left as usize);
-        let count = self.file.read_at(&mut into[..most], *at)?;
+        let count = read_at(&self.file, &mut into[..most], *at)?;
         if count == 0 && most > 0 {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
@@ -222,6 +222,14 @@ impl Read for TileReader<'_> {
         *left -= count as u32;
         Ok(count)
     }
+}
+
+/// Reads from a position of a file, which other threads may do at the same time.
+fn read_at(file: &File, into: &mut [u8], at: u64) -> io::Result<usize> {
+    #[cfg(unix)]
+    return std::os::unix::fs::FileExt::read_at(file, into, at);
+    #[cfg(windows)]
+    return std::os::windows::fs::FileExt::seek_read(file, into, at);
 }
 
 #[cfg(test)]
