@@ -1,4 +1,4 @@
-//! Where a block's nodes go: textured, written as GLB, and remembered for `scene.hlod`.
+//! Writes a block's nodes: textures them, encodes them as GLB, and records them for `scene.hlod`.
 
 use crate::builder::border::skirt;
 use crate::builder::hierarchy::{NodeDraft, NodeSink};
@@ -15,7 +15,7 @@ use crate::mesh::{Kept, Mesh, UpAxis, Warnings};
 use crate::texture::{AppendedSkirts, BakeReason, BakedMesh, BlockTextures, TexturedNode};
 use crate::{Error, Result};
 
-/// What is kept of a written node.
+/// The record of a written node.
 #[derive(Clone, Debug)]
 pub struct NodeRecord {
     /// Identity, from the file's name.
@@ -36,26 +36,26 @@ pub struct NodeRecord {
     pub mean_error: f64,
     /// 95th percentile of it.
     pub p95_error: f64,
-    /// Width and height of each of its own pictures, in the order of the file.
+    /// Width and height of each of its own images, in the order of the file.
     pub pictures: Vec<[u32; 2]>,
-    /// Texels and names of the shared pictures that it uses.
+    /// Names and texels of the shared textures that it uses.
     pub shared: Vec<(String, u64)>,
-    /// The triangles that it should have at most.
+    /// Its triangle budget.
     pub budget: usize,
-    /// How it was made; `None` where it was taken over from an earlier build.
+    /// The step that made it; `None` if it was reused from an earlier build.
     pub step: Option<LadderStep>,
-    /// Why it has a texture of its own, where it has.
+    /// Why it has a baked texture, if it has one.
     pub baked: Option<BakeReason>,
-    /// Why it has more than it may, where it has.
+    /// Why it exceeds its budget, if it does.
     pub reason: Option<String>,
     /// The number of its block in the scene; `None` of a district, and while blocks have none.
     pub block: Option<u32>,
-    /// What was imperfect.
+    /// Warnings about it.
     pub warnings: Warnings,
 }
 
 impl NodeRecord {
-    /// Texels of its own pictures.
+    /// Texels of its own images.
     pub fn own_texels(&self) -> u64 {
         self.pictures.iter().map(|&[width, height]| u64::from(width) * u64::from(height)).sum()
     }
@@ -63,9 +63,9 @@ impl NodeRecord {
 
 /// Writes the nodes of one block.
 pub struct DiskSink<'a> {
-    /// Pictures of the block at every level.
+    /// The block's textures at every level.
     pub textures: &'a BlockTextures<'a>,
-    /// Where files go.
+    /// The output folder.
     pub out: &'a OutputDir,
     /// Beginning of the block's file names; unique in the output.
     pub prefix: String,
@@ -79,7 +79,7 @@ pub struct DiskSink<'a> {
     pub copyright: Option<&'a str>,
     /// `c_textured`.
     pub textured_weight: f64,
-    /// Where the time goes.
+    /// Timers of the stages.
     pub stages: &'a Stages,
     /// Told of finished leaves.
     pub progress: &'a dyn Progress,
@@ -182,7 +182,7 @@ impl DiskSink<'_> {
     }
 }
 
-/// Why a node has more triangles than it may.
+/// Why a node exceeds its triangle budget.
 fn over_budget(node: &NodeDraft, triangles: usize) -> Option<String> {
     if node.step == LadderStep::Original
         || triangles as f64 <= (node.budget as f64 * BUDGET_TOLERANCE).ceil()

@@ -1,4 +1,4 @@
-//! Bringing a node to its triangle budget: the ladder from careful to sure.
+//! Simplification of a node to its triangle budget, by methods that change ever more.
 //!
 //! 1. Quadric edge collapse with attributes (Garland & Heckbert as meshoptimizer has it, with
 //!    vertex positions and attributes solved for afterwards), inside texture seams.
@@ -7,14 +7,13 @@
 //!    whichever of these and it is measured to stay nearest to the input on average:
 //!    - the same, across material borders too, and leaving out the smallest separate parts; triangles
 //!      then get one material each again ([`crate::builder::simplify::split_mixed`]);
-//!    - the same as the first, of faces that wind one way ([`crate::builder::simplify::orient`]);
-//!    - vertex clustering ([`crate::builder::simplify::cluster`]), which has no topology to respect;
-//!      where parts are large, only if collapse moves the surface farther.
+//!    - the first, of faces with a consistent winding ([`crate::builder::simplify::orient`]);
+//!    - vertex clustering ([`crate::builder::simplify::cluster`]), which has no topology to respect.
 //!
-//! Where the mesh is many separate bodies and the budget leaves few triangles to each, extruded
-//! footprints for them (`crate::builder::simplify::aggregate`) are tried against what the ladder
-//! gave, by the same measure; where it leaves so few that nothing else would keep them, they are
-//! taken at once.
+//! Where the mesh has many separate components and the budget leaves few triangles to each, extruded
+//! footprints (`crate::builder::simplify::aggregate`) are compared with these results by the same
+//! measure. Where it leaves so few that no other method would keep the components, footprints are
+//! used without a comparison.
 //!
 //! Border vertices that the level keeps are locked throughout.
 
@@ -59,18 +58,18 @@ pub struct Method<'a> {
     pub weights: AppearanceWeights,
     /// Which axis points at the sky.
     pub up: UpAxis,
-    /// Of each material, whether its faces may turn ([`crate::builder::simplify::orient`]).
+    /// For each material, whether its faces may be flipped ([`crate::builder::simplify::orient`]).
     pub reorientable: &'a [bool],
     /// See [`BodyRules`].
     pub extrudable: &'a [bool],
-    /// A step that is not tried, to measure what it is worth.
+    /// A step that is not tried, to measure its effect.
     pub without: Option<LadderStep>,
     /// See [`Constants`].
     pub constants: &'a Constants,
 }
 
 impl Method<'_> {
-    /// What counts as a body.
+    /// The rules by which a component counts as a building.
     pub fn bodies(&self) -> BodyRules<'_> {
         let &Self { up, extrudable, constants, .. } = self;
         BodyRules { up, extrudable, constants: &constants.prisms }
@@ -104,17 +103,17 @@ pub fn simplify(
         return source;
     }
     let mut simplified = nearest(&source, &locked, target, limit, method);
-    let reach = constants.simplify.far_part * share(&source.mesh, target);
+    let reach = constants.simplify.far_part * target_edge(&source.mesh, target);
     keep_far_parts(&mut simplified, &source, &locked, reach, limit, method);
     simplified
 }
 
-/// The side of a square as large as a triangle may be, metres.
-fn share(mesh: &Mesh, target: usize) -> f64 {
+/// The side, in metres, of a square with the mean area of a triangle of the target.
+fn target_edge(mesh: &Mesh, target: usize) -> f64 {
     (mesh.area() / target as f64).sqrt()
 }
 
-/// What of the ladder's steps stays nearest to the source.
+/// The result of the ladder's steps that is nearest to the source.
 fn nearest(
     source: &Simplified,
     locked: &[bool],
@@ -144,11 +143,11 @@ fn nearest(
         }
     }
     let mut candidates = Vec::new();
-    let share = share(&source.mesh, target);
+    let target_edge = target_edge(&source.mesh, target);
     let rules = &constants.simplify;
     let is_unfit =
         best.mesh.triangles.len() > limit || has_duplicate_faces(&source.mesh, rules.few_faces);
-    if is_unfit || best.error > rules.doubtful * share {
+    if is_unfit || best.error > rules.doubtful * target_edge {
         // Over one sheet it does what collapse did.
         if tries(LadderStep::Prune) && !is_one_sheet(&source.mesh, locked) {
             candidates.push(collapsed(LadderStep::Prune));
@@ -158,10 +157,17 @@ fn nearest(
         }
         if tries(LadderStep::Oriented) {
             let few = rules.few_faces;
-            candidates.extend(wound(source, locked, target, weights, reorientable, few));
+            candidates.extend(collapsed_with_set_winding(
+                source,
+                locked,
+                target,
+                weights,
+                reorientable,
+                few,
+            ));
         }
     }
-    // Prisms have no floors, which nobody misses.
+    // Prisms have no floors; these are left out of the comparison.
     let seen = |mesh: &Mesh| without_floors(mesh, up);
     let has_prisms = prisms.is_some();
     candidates.extend(prisms);
@@ -171,14 +177,14 @@ fn nearest(
     let source_seen = if has_prisms { &seen(&source.mesh) } else { &source.mesh };
     let mut from_source = MeanDistance::from(source_seen, constants.measure);
     let mut rank = |candidate: &Simplified, best: (Rank, f64)| {
-        let nearest = if best.0 == Rank::Near { best.1 } else { f64::INFINITY };
+        let nearest = if best.0 == Rank::WithinBudget { best.1 } else { f64::INFINITY };
         let distance = || match has_prisms {
             true => from_source.to(&seen(&candidate.mesh), nearest),
             false => from_source.to(&candidate.mesh, nearest),
         };
-        Rank::of(candidate.mesh.triangles.len(), limit, distance, share)
+        Rank::of(candidate.mesh.triangles.len(), limit, distance, target_edge)
     };
-    let mut best = (rank(&best, (Rank::FarOver, f64::INFINITY)), best);
+    let mut best = (rank(&best, (Rank::OverBudgetSevere, f64::INFINITY)), best);
     for candidate in candidates {
         let rank = rank(&candidate, best.0);
         if !candidate.mesh.triangles.is_empty() && rank.partial_cmp(&best.0) == Some(Ordering::Less)
@@ -189,43 +195,44 @@ fn nearest(
     best.1
 }
 
-/// How a candidate does, the best first.
+/// The ranks of candidates, the best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Rank {
-    /// Within the budget: the nearest to the input is taken.
-    Near,
-    /// Over it, by half of itself at most: that with the fewest triangles.
-    Over,
-    /// On average farther from the input than a square is wide that is as large as a triangle may
-    /// be, so that whole sides are gone: the nearest.
-    Far,
-    /// Far over the budget: that with the fewest triangles.
-    FarOver,
+    /// Within the budget. The nearest to the input is best.
+    WithinBudget,
+    /// Over the budget, by at most its double. The one with the fewest triangles is best.
+    OverBudget,
+    /// On average farther from the input than [`target_edge`], so that whole sides are missing. The
+    /// nearest is best.
+    Distant,
+    /// More than twice the budget. The one with the fewest triangles is best.
+    OverBudgetSevere,
 }
 
 impl Rank {
-    /// The rank of a candidate with so many triangles and so far from the input, and by what it is
-    /// compared with those of the same rank; less is better.
+    /// The rank of a candidate by its triangles and its distance from the input, and the value that
+    /// orders candidates of the same rank. Less is better.
     fn of(
         triangles: usize,
         limit: usize,
         distance: impl FnOnce() -> f64,
-        share: f64,
+        target_edge: f64,
     ) -> (Self, f64) {
         if triangles > 2 * limit {
-            return (Self::FarOver, triangles as f64);
+            return (Self::OverBudgetSevere, triangles as f64);
         }
         let distance = distance();
-        match (triangles <= limit, distance <= share) {
-            (true, true) => (Self::Near, distance),
-            (false, true) => (Self::Over, triangles as f64),
-            (_, false) => (Self::Far, distance),
+        match (triangles <= limit, distance <= target_edge) {
+            (true, true) => (Self::WithinBudget, distance),
+            (false, true) => (Self::OverBudget, triangles as f64),
+            (_, false) => (Self::Distant, distance),
         }
     }
 }
 
-/// Edge collapse of faces that wind one way, each there once; `None` where they do already.
-fn wound(
+/// Edge collapse after duplicate faces are removed and all have a consistent winding; `None` where this
+/// changes nothing.
+fn collapsed_with_set_winding(
     source: &Simplified,
     locked: &[bool],
     target: usize,
@@ -243,7 +250,7 @@ fn wound(
     Some(Simplified { mesh, border, error: 0.0, step })
 }
 
-/// Bodies as they were extruded, and the rest collapsed.
+/// Extruded components, with the rest simplified by edge collapse.
 fn completed(
     source: &Simplified,
     extruded: Extruded,
@@ -279,7 +286,7 @@ mod tests {
 
     #[test]
     fn a_budget_is_no_reason_to_leave_out_whole_sides() {
-        // The second of each pair is worse; the share of a triangle is 4 m wide.
+        // The second of each pair is worse; the target edge is 4 m.
         let of = |triangles, distance| Rank::of(triangles, 100, || distance, 4.0);
         for [better, worse] in [
             [of(90, 1.0), of(20, 2.0)],

@@ -1,4 +1,4 @@
-//! Which blocks are baked.
+//! The decision which coarse nodes of a block get a baked texture.
 
 use serde::{Deserialize, Serialize};
 
@@ -27,20 +27,20 @@ impl BakeReason {
     }
 }
 
-/// A block whose root has fewer triangles than this for each chart is torn: seams then shape its
-/// coarse nodes more than the surface does, and gutters take much of their atlases. Scans have 2 to
+/// Triangles of the root for each chart below which all coarse nodes are baked. With fewer, seams
+/// determine their shape more than the surface does, and gutters take much of their atlases. Scans have 2 to
 /// 10, generated façades and roofs more than 100.
 const TORN: usize = 16;
 
-/// With fewer than this, seams may keep single nodes from their budget.
+/// Triangles of the root for each chart below which nodes that miss their budget are baked.
 const DOUBTFUL: usize = 64;
 
-/// What may be baked in a block.
+/// The coarse nodes of a block that may be baked.
 #[derive(Clone, Copy, Debug)]
 pub struct BakePlan<'a> {
-    /// The materials that it may be done to.
+    /// The materials whose textures may be baked.
     pub classes: &'a BakeClasses,
-    /// Why it is to be done to every coarse node; `None` where only to those that need it.
+    /// The reason to bake every coarse node; `None` if only those that need it are baked.
     pub always: Option<BakeReason>,
 }
 
