@@ -21,8 +21,8 @@ impl NodeId {
     /// the same id with a probability of 3e-6.
     pub fn of_file(file: &str) -> Self {
         let hash = blake3::hash(file.as_bytes());
-        let (bytes, _) = hash.as_bytes().split_first_chunk().expect("a hash has 32 bytes");
-        Self(u64::from_be_bytes(*bytes))
+        let [a, b, c, d, e, f, g, h, ..] = *hash.as_bytes();
+        Self(u64::from_be_bytes([a, b, c, d, e, f, g, h]))
     }
 }
 

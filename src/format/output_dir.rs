@@ -524,8 +524,9 @@ fn flush(folder: &Path) -> io::Result<()> {
         if entry.file_type()?.is_dir() {
             flush(&entry.path())?;
         } else {
-            // Windows flushes files that are open for writing alone.
-            File::options().write(true).open(entry.path())?.sync_all()?;
+            // Windows flushes a file only if it is open for writing. Elsewhere files that were made read-only
+            // can be flushed too.
+            File::options().read(true).write(cfg!(windows)).open(entry.path())?.sync_all()?;
         }
     }
     Ok(())

@@ -10,10 +10,10 @@
 //!    - the first, of faces with a consistent winding ([`crate::builder::simplify::orient`]);
 //!    - vertex clustering ([`crate::builder::simplify::cluster`]), which has no topology to respect.
 //!
-//! Where the mesh has many separate components and the budget leaves few triangles to each, extruded
-//! footprints (`crate::builder::simplify::aggregate`) are compared with these results by the same
-//! measure. Where it leaves so few that no other method would keep the components, footprints are
-//! used without a comparison.
+//! Extruded footprints (`crate::builder::simplify::aggregate`) are compared with these results, by the
+//! same measure, if the mesh has many separate components and the budget leaves few triangles to each. If
+//! it leaves so few that no other method would keep the components, footprints are used without a
+//! comparison.
 //!
 //! Border vertices that the level keeps are locked throughout.
 

@@ -1,4 +1,4 @@
-//! Whether a mesh is one connected surface.
+//! A test that tells whether a mesh is one connected surface without seams.
 
 use rustc_hash::FxHashSet;
 

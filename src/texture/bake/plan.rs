@@ -44,8 +44,9 @@ pub struct BakePlan<'a> {
     pub always: Option<BakeReason>,
 }
 
-/// Whether a block of so many charts, whose root may have so many triangles, keeps what baking
-/// needs, and why all of its coarse nodes are baked.
+/// Decides about a block with this number of charts, whose root has this triangle budget. `None` means
+/// that no node is baked, `Some(None)` that nodes are baked that miss their budget, and a reason that all
+/// coarse nodes are baked.
 pub(crate) fn bake_decision(charts: usize, triangles: usize) -> Option<Option<BakeReason>> {
     if charts * TORN > triangles {
         Some(Some(BakeReason::Torn))
