@@ -2,7 +2,7 @@
 //!
 //! usage: cut_into_tiles MODEL N FOLDER [MILLIMETRES]
 //!
-//! By so many millimetres at most each tile's coordinates are off, by chance: borders then nearly agree.
+//! With MILLIMETRES, each tile is shifted at random by at most that along each axis, so that borders agree only nearly.
 
 use std::error::Error;
 use std::path::Path;

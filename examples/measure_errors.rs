@@ -8,10 +8,10 @@ use std::error::Error;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use hlod::builder::blocks::gather::gather;
 use hlod::builder::border::vertex::{self, Border};
 use hlod::builder::constants::Constants;
-use hlod::builder::error::{Original, measure};
+use hlod::builder::error::{Below, Original, measure};
+use hlod::builder::gather::gather;
 use hlod::builder::simplify::ladder::{AppearanceWeights, Method, Simplifier, simplify};
 use hlod::mesh::{Mesh, UpAxis};
 
@@ -60,10 +60,12 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let path = vertex::Path::default();
                 let simplified = simplify(chunk, &border, &path, 0, target, &method).mesh;
                 let begin = Instant::now();
-                let original = Original::of(chunk, constants.measure);
+                let below = Below::source(Original::of(chunk, constants.measure), 0.0);
                 made += begin.elapsed();
                 let begin = Instant::now();
-                let result = measure(&original, &simplified);
+                let node = Original::of(&simplified, constants.measure);
+                let none = Original::of(&Mesh::default(), constants.measure);
+                let result = measure(&below, &node, &none);
                 measured += begin.elapsed();
                 triangles += chunk.triangles.len();
                 exhausted += usize::from(result.exhausted);

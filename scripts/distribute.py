@@ -37,7 +37,7 @@ def main():
     with client:
         workers = len(client.scheduler_info()["workers"])
         # Several for each worker, so that none waits long for the last.
-        of = arguments.shares or min(4 * max(1, workers), inputs_of(arguments))
+        of = arguments.shares or min(4 * max(1, workers), blocks_of(arguments))
         shares = build(client, arguments, of)
     merging = time.monotonic()
     merge = [arguments.program, "merge", "--quiet", "--threads", "0", arguments.build[-1]]
@@ -56,7 +56,7 @@ def parse():
     )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a cluster, such as tcp://host:8786")
     parser.add_argument("--workers", type=int, help="processes on this machine [one for each core]")
-    parser.add_argument("--shares", type=int, help="subsets [4 for each worker, one for each input at most]")
+    parser.add_argument("--shares", type=int, help="subsets [4 for each worker, one for each block at most]")
     parser.add_argument("--threads", type=int, default=0, help="of each hlod-build [its worker's part of the cores]")
     parser.add_argument("--retries", type=int, default=3, help="times that a share is tried again [3]")
     parser.add_argument("--program", default=shutil.which("hlod-build"), help="hlod-build, where it is not in PATH")
@@ -72,13 +72,16 @@ def parse():
     return arguments
 
 
-def inputs_of(arguments):
-    """How many inputs there are: hlod-build says so of a subset that is one of too many."""
+def blocks_of(arguments):
+    """Returns the number of blocks, from the message with which hlod-build refuses more subsets than blocks.
+
+    The probe scans all inputs. --shares avoids it.
+    """
     probe = [arguments.program, "--quiet", "--subset", "1/4294967295", *arguments.build]
     done = subprocess.run(probe, capture_output=True, text=True)
     found = done.stderr.rstrip().rpartition("found ")[2]
     if not found.isdigit():
-        sys.exit(done.stderr.strip() or "distribute: cannot tell how many inputs there are")
+        sys.exit(done.stderr.strip() or "distribute: cannot tell how many blocks there are")
     return int(found)
 
 

@@ -25,7 +25,6 @@ FRONTS = (0.15, 0.6)
 
 # Where half and twice are not what to try.
 TRIED = {
-    ("blocks", "large_group"): (100, 1600),
     ("tree", "last_step_tolerance"): (1.0, 4.0),
     ("cut", "shortest_side"): (0.1, 0.6),
     ("cut", "least_share"): (0.25, 0.9),

@@ -1,36 +1,30 @@
-//! From one imported model to the trees of its blocks.
-
-use std::path::Path;
-
-use rayon::prelude::*;
-use rustc_hash::FxHashSet;
+//! From the triangles that a block gets to its tree.
 
 use crate::Result;
-use crate::builder::block_setup::{BlockPlace, BlockSetup, Looks, Target};
-use crate::builder::blocks::block_plan::{BlockPlan, Division};
-use crate::builder::blocks::gather::{divide, gather, localise};
-use crate::builder::blocks::merge_adjacent::plan_of_parts;
-use crate::builder::blocks::merge_untextured::merge_untextured;
-use crate::builder::blocks::outliers::set_outliers_aside;
-use crate::builder::blocks::plan::plan;
-use crate::builder::border::shared::{
-    Bounds, bounds_of, is_of_shared, keep_shared, shared_positions,
-};
-use crate::builder::cut::split::Chunk;
+use crate::builder::block_setup::{BlockPlace, BlockSetup};
+use crate::builder::border::chain::KeepRule;
+use crate::builder::border::face::{FaceBorder, SideTriangle};
+use crate::builder::border::mark::{Marks, mark_border};
+use crate::builder::border::record::RecordedBorder;
+use crate::builder::cut::cell::CellCut;
+use crate::builder::cut::section::Triangle;
 use crate::builder::emit::disk_sink::{NodeRecord, file_name};
+use crate::builder::gather::{gather, localise};
 use crate::builder::hierarchy::{BorderMode, Forest, HierarchyOptions, LeftOut, Resolutions, Tree};
-use crate::builder::options::BuildOptions;
-use crate::builder::simplify::aggregate::BodyRules;
-use crate::builder::stages::{Stage, Stages};
-use crate::builder::stitch::{OpenEdge, Stitch, stitches};
-use crate::builder::threads::in_parallel;
-use crate::builder::tiles::border::InputBorder;
-use crate::format::BlockInfo;
-use crate::lattice::Lattice;
-use crate::lattice::Quantization;
-use crate::mesh::{Material, Model, Part, PositionKey, UpAxis, Warnings, key};
-use crate::report::build_report::{BlockCut, LeftOutNode};
-use crate::texture::TextureCache;
+use crate::builder::outliers::set_outliers_aside;
+use crate::builder::scatter::BlockParts;
+use crate::builder::simplify::simplified::LadderStep;
+use crate::builder::stages::Stage;
+use crate::builder::stitch::{OpenEdge, stitches};
+use crate::builder::world::World;
+use crate::format::{BORDERS_DIR, BlockInfo};
+use crate::lattice::{Lattice, Quantization};
+use crate::mesh::{Normal, Part, Warnings, key};
+use crate::report::build_report::{BlockReport, Count, LeftOutNode, most_frequent};
+use crate::texture::BakeReason;
+
+/// Steps of simplification that borders between blocks are ranked for.
+const RANKED_STEPS: u32 = 8;
 
 /// A block whose nodes are written.
 #[derive(Clone, Debug)]
@@ -39,6 +33,8 @@ pub struct BuiltBlock {
     pub info: BlockInfo,
     /// Its nodes: one tree, or several where roots are left out.
     pub trees: Vec<Tree<NodeRecord>>,
+    /// For `build.json`.
+    pub report: BlockReport,
 }
 
 impl BuiltBlock {
@@ -48,368 +44,281 @@ impl BuiltBlock {
     }
 }
 
-/// The blocks of one input.
-pub struct BuiltInput {
-    /// In the order of the source.
-    pub blocks: Vec<BuiltBlock>,
-    /// Coarse nodes that are not written, by file.
-    pub left_out: Vec<LeftOutNode>,
-    /// Different source texels that its triangles use, repeating textures aside.
-    pub used_texels: u64,
-    /// Open edges between which there are stitches ([`crate::builder::stitch`]).
-    pub stitched_edges: u64,
-    /// The planes that divided it, in order.
-    pub cuts: Vec<BlockCut>,
-    /// What was imperfect.
-    pub warnings: Warnings,
+/// The file of the borders of a block, inside an output folder.
+pub fn border_file(name: &str) -> String {
+    format!("{BORDERS_DIR}/{name}.border")
 }
 
-/// A block about to be gathered.
-struct Draft {
-    name: String,
-    /// Strays, on a lattice of their own.
-    far: bool,
-    source: DraftSource,
-    materials: Vec<u32>,
+/// A block about to be built.
+pub struct Draft {
+    /// Beginning of its files' names, unique in the output.
+    pub name: String,
+    /// For people, and the input that it has most triangles of.
+    pub title: [String; 2],
+    /// A hash of all that it is made of.
+    pub made_of: String,
+    /// What it gets of all inputs, of materials of the [`World`].
+    pub parts: BlockParts,
+    /// Where it is.
+    pub cut: CellCut,
 }
 
-enum DraftSource {
-    Parts(Vec<Part>, Vec<Stitch>),
-    Chunk(Box<Chunk<f64>>),
+/// What all blocks have in common.
+pub struct Blocks<'a> {
+    /// Their materials.
+    pub world: &'a World,
+    /// How nodes are made and where they go.
+    pub setup: &'a BlockSetup<'a>,
+    /// One lattice for all, so that blocks that touch agree on where.
+    pub lattice: Lattice,
 }
 
-impl DraftSource {
-    fn positions(&self) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
-        match self {
-            Self::Parts(parts, _) => {
-                Box::new(parts.iter().flat_map(|part| part.positions.iter().copied()))
-            }
-            Self::Chunk(chunk) => Box::new(chunk.mesh.positions.iter().copied()),
+impl Blocks<'_> {
+    /// Builds a block and writes its nodes and borders. Of what lies so far off that it would cost the rest
+    /// its digits it makes a block of its own. None where no triangle is left.
+    pub fn build(&self, draft: Draft) -> Result<Vec<BuiltBlock>> {
+        let stages = self.setup.target().stages;
+        let Draft { name, title, made_of, parts: BlockParts { inner, crossing }, cut } = draft;
+        let stray = stages.time(Stage::Gather, || set_outliers_aside(&inner));
+        let (inner, far) = stray.unwrap_or((inner, Vec::new()));
+        let mut built = Vec::new();
+        let near = Near { name: name.clone(), title: title.clone(), made_of: made_of.clone() };
+        built.extend(self.near(near, inner, crossing, &cut)?);
+        if !far.is_empty() {
+            let [people, input] = title;
+            let title = [format!("{people} (far off)"), input];
+            let corners = || far.iter().flat_map(|part| part.positions.iter().copied());
+            let lattice = lattice_of(corners(), self.setup.target().options.quantization());
+            let own = Self { lattice, ..*self };
+            let far_off = Near { name: format!("{name}-far"), title, made_of };
+            built.extend(own.near(far_off, far, Vec::new(), &cut)?);
         }
+        Ok(built)
     }
 
-    /// Positions that no cut made: those on a cutting plane are the plane's business.
-    fn uncut_positions(&self) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
-        match self {
-            Self::Parts(..) => self.positions(),
-            Self::Chunk(chunk) => {
-                let bits = 0..chunk.path.len() as u32;
-                let shared = bits.filter(|&bit| is_of_shared(chunk.path.plane(bit)));
-                let shared = shared.fold(0u64, |bits, bit| bits | 1 << bit);
-                let of_plane = chunk.mesh.positions.iter().zip(&chunk.border.planes);
-                let uncut = of_plane.filter(move |&(_, &on)| on == 0 || on & shared != 0);
-                Box::new(uncut.map(|(position, _)| *position))
-            }
-        }
-    }
-
-    fn bounds(&self) -> ([f64; 3], [f64; 3]) {
-        bounds_of(self.positions())
-    }
-}
-
-/// Builds all blocks of a model and writes their nodes.
-pub fn build_input(
-    mut model: Model,
-    up: UpAxis,
-    border: &InputBorder,
-    target: Target,
-) -> Result<BuiltInput> {
-    let Target { options, stages, progress, .. } = target;
-    let mut warnings = std::mem::take(&mut model.warnings);
-    let quantization = options.quantization();
-    let of_tile = border.bounds.map(|_| Lattice::for_tile(model.bounds()));
-    merge_untextured(&mut model);
-    let HierarchyOptions { desired_tris, constants, .. } = &options.hierarchy;
-    let looks = Looks::new(&model);
-    let kinds = looks.kinds(&model.parts);
-    let stitches = stages.time(Stage::Gather, || {
-        let shared = border.positions();
-        let goes_on = |edge: &OpenEdge| edge.ends.iter().all(|end| shared.contains(&key(*end)));
-        stitches(&model.parts, kinds, &constants.stitch, goes_on)
-    });
-    let Looks { textures: texture_plan, extrudable, .. } = looks;
-    // Where textures are many and small enough to keep a root from being what it should, they are
-    // baked anew.
-    let rules =
-        BodyRules { up, extrudable: extrudable.materials(true), constants: &constants.prisms };
-    let plans = plan(&model, options.blocks, *desired_tris, &stitches, &constants.blocks, &rules);
-    let stitched_edges = stitches.len() as u64;
-    let (stitches, across) = by_plan(&plans, stitches, model.parts.len());
-    let drafts = drafts(&mut model, plans, stitches, border, options, &rules, stages);
-    let lattice_of = |drafts: &mut dyn Iterator<Item = &Draft>| {
-        let fine = lattice_of(drafts);
-        let fine = of_tile.map_or(fine, |of_tile| fine.coarser(of_tile));
-        if let Some(Quantization { step }) = quantization.filter(|coarse| coarse.step < fine.step) {
-            let what = format!(
-                "{}: blocks too large for steps of {step} m; rounded to {} m",
-                model.source.display(),
-                fine.step
-            );
-            return (fine, Some(what));
-        }
-        (fine.or_coarser(quantization), None)
-    };
-    let (common, coarse) = lattice_of(&mut drafts.iter().filter(|draft| !draft.far));
-    if let Some(what) = coarse {
-        warnings.add(what, 1);
-    }
-    let cuts = cuts(&drafts, border, common);
-    let shared_vertices = stages.time(Stage::Gather, || {
-        let bounds: Vec<_> = drafts.iter().map(|draft| draft.source.bounds()).collect();
-        let mut shared = shared_positions(&bounds, |block| drafts[block].source.uncut_positions());
-        shared.extend(across);
-        shared
-    });
-    let cache = TextureCache::new(
-        &model,
-        &texture_plan,
-        drafts.iter().map(|draft| draft.materials.iter().copied()),
-    );
-    let prefix = file_prefix(&model.source);
-    let setup = BlockSetup::new(target, up, &cache, &extrudable);
-    let built = in_parallel(drafts, |number, draft| {
-        let (lattice, coarse) =
-            if draft.far { lattice_of(&mut [&draft].into_iter()) } else { (common, None) };
-        let Draft { name, source, .. } = draft;
-        let (low, high) = source.bounds();
-        let origin = lattice.origin_near(std::array::from_fn(|i| (low[i] + high[i]) * 0.5));
-        let (chunk, collapsed) = stages.time(Stage::Gather, || {
-            let mut chunk = match source {
-                DraftSource::Parts(parts, stitches) => {
-                    let mut chunk = gather(&model.materials, &parts, &stitches);
-                    border.mark(&mut chunk);
-                    chunk
-                }
-                DraftSource::Chunk(chunk) => *chunk,
-            };
-            keep_shared(&mut chunk, &shared_vertices);
-            localise(chunk, origin, lattice, quantization.is_some())
+    fn near(
+        &self,
+        Near { name, title, made_of }: Near,
+        mut parts: Vec<Part>,
+        crossing: Vec<Part>,
+        cut: &CellCut,
+    ) -> Result<Option<BuiltBlock>> {
+        let target = self.setup.target();
+        let (options, stages) = (target.options, target.stages);
+        let hierarchy = &options.hierarchy;
+        let lattice = self.lattice;
+        let triangles =
+            parts.iter().chain(&crossing).map(|part| part.indices.len() as u64 / 3).sum();
+        let faces = stages.time(Stage::Cut, || self.faces(&crossing, cut));
+        stages.time(Stage::Cut, || {
+            let pieces = crossing.iter().map(|part| piece(part, cut, lattice));
+            parts.extend(pieces.filter(|part| !part.indices.is_empty()));
         });
-        let mut warnings = Warnings::default();
-        if let Some(what) = coarse {
-            warnings.add(what, 1);
+        drop(crossing);
+        let kinds = self.world.looks.kinds(&parts);
+        let goes_on = |edge: &OpenEdge| {
+            let in_plane = |axis: usize, at: f64| edge.ends.iter().all(|end| end[axis] == at);
+            cut.sides().iter().any(|side| in_plane(side.plane.axis, side.plane.at))
+        };
+        let (chunk, stitched_edges) = stages.time(Stage::Gather, || {
+            let between = stitches(&parts, kinds, &hierarchy.constants.stitch, goes_on);
+            (gather(&self.world.model.materials, &parts, &between), between.len() as u64)
+        });
+        drop(parts);
+        let mut chunk = chunk;
+        if chunk.mesh.triangles.is_empty() {
+            return Ok(None);
         }
+        let resolutions = Resolutions::new(chunk.mesh.triangles.len(), hierarchy);
+        let border = RecordedBorder::of(faces.iter());
+        let marks = Marks {
+            planes: faces.iter().map(|face| &*face.plane).collect(),
+            touching: faces.iter().flat_map(|face| &face.touching).map(|&at| key(at)).collect(),
+            // Ranked for as many steps as any block may have.
+            coarser: RANKED_STEPS as usize - resolutions.last().min(RANKED_STEPS as usize),
+        };
+        stages.time(Stage::Gather, || mark_border(&mut chunk, &marks));
+        drop(faces);
+        let (low, high) = match chunk.mesh.bounds() {
+            Some(bounds) => bounds,
+            None => return Ok(None),
+        };
+        let origin = lattice.origin_near(std::array::from_fn(|i| (low[i] + high[i]) * 0.5));
+        let follow = options.quantization().is_some();
+        let (chunk, collapsed) =
+            stages.time(Stage::Gather, || localise(chunk, origin, lattice, follow));
+        let mut warnings = Warnings::default();
         warnings.add(
             format!(
-                "{}: triangle thinner than the precision of its block ({:e} m) left out",
-                model.source.display(),
+                "triangle thinner than the precision of its block ({:e} m) left out",
                 lattice.step
             ),
             collapsed,
         );
         if chunk.mesh.triangles.is_empty() {
-            progress.built(collapsed);
-            return Ok((None, warnings, 0));
+            target.progress.built(collapsed);
+            return Ok(None);
         }
-        let resolutions = Resolutions::new(chunk.mesh.triangles.len(), &options.hierarchy);
-        let place = BlockPlace { prefix: format!("{prefix}-{number:04}"), origin, lattice };
-        let textures = setup.textures(&chunk.mesh, &resolutions);
-        let sink = setup.sink(&textures, &place);
-        let builder = setup.builder(&sink, resolutions, lattice);
+        let place = BlockPlace { prefix: name.clone(), origin, lattice };
+        let textures = self.setup.textures(&chunk.mesh, &resolutions);
+        let sink = self.setup.sink(&textures, &place);
+        let builder = self.setup.builder(&sink, resolutions, lattice);
         let Forest { trees, left_out } = builder.build(chunk)?;
-        let left_out = left_out.into_iter().map(|LeftOut { child_path, triangles, kept }| {
-            LeftOutNode { file: file_name(&sink.prefix, &child_path), triangles, kept }
-        });
-        let info =
-            BlockInfo { name, input: crate::builder::inputs::text_of(&model.source), origin };
-        let block = BuiltBlock { info, trees };
-        Ok((Some((block, left_out.collect())), warnings, textures.used_texels()))
-    })?;
-    let mut blocks = Vec::with_capacity(built.len());
-    let mut left_out: Vec<LeftOutNode> = Vec::new();
-    let mut used_texels = 0;
-    for (block, block_warnings, texels) in built {
-        if let Some((block, of_block)) = block {
-            blocks.push(block);
-            left_out.extend::<Vec<_>>(of_block);
-        }
-        warnings.extend(block_warnings);
-        used_texels += texels;
-    }
-    warnings.extend(cache.warnings());
-    left_out.sort_by(|a, b| a.file.cmp(&b.file));
-    Ok(BuiltInput { blocks, left_out, used_texels, stitched_edges, cuts, warnings })
-}
-
-/// The planes that divided drafts and those along which they meet other inputs, as their nodes have them.
-fn cuts(drafts: &[Draft], border: &InputBorder, lattice: Lattice) -> Vec<BlockCut> {
-    let chunks = drafts.iter().filter_map(|draft| match &draft.source {
-        DraftSource::Chunk(chunk) => Some(chunk),
-        DraftSource::Parts(..) => None,
-    });
-    let planes =
-        chunks.flat_map(|chunk| (0..chunk.path.len() as u32).map(|bit| chunk.path.plane(bit)));
-    let planes = planes.filter(|plane| !is_of_shared(plane));
-    let mut cuts: Vec<BlockCut> = planes
-        .map(|plane| (plane.axis, plane.coordinate))
-        .chain(border.planes())
-        .map(|(axis, coordinate)| BlockCut { axis, coordinate: lattice.round(coordinate) + 0.0 })
-        .collect();
-    cuts.sort_by(|a, b| a.axis.cmp(&b.axis).then(a.coordinate.total_cmp(&b.coordinate)));
-    cuts.dedup();
-    cuts
-}
-
-/// The stitches within each plan, and the positions between which there are stitches from one plan
-/// to another. These stay at every level, as those do that blocks have in common.
-fn by_plan(
-    plans: &[BlockPlan],
-    stitches: Vec<Stitch>,
-    parts: usize,
-) -> (Vec<Vec<Stitch>>, FxHashSet<PositionKey<f64>>) {
-    let plan_of = plan_of_parts(plans, parts);
-    let mut within = vec![Vec::new(); plans.len()];
-    let mut across = FxHashSet::default();
-    for stitch in stitches {
-        let [a, b] = stitch.parts.map(|part| plan_of[part as usize]);
-        if a == b {
-            within[a].push(stitch);
-        } else {
-            across.extend([stitch.edge[0], stitch.edge[1], stitch.apex].map(key));
-        }
-    }
-    (within, across)
-}
-
-/// Takes the parts out of the model and divides those blocks that are to be divided.
-fn drafts(
-    model: &mut Model,
-    plans: Vec<BlockPlan>,
-    stitches: Vec<Vec<Stitch>>,
-    border: &InputBorder,
-    options: &BuildOptions,
-    rules: &BodyRules,
-    stages: &Stages,
-) -> Vec<Draft> {
-    let mut parts: Vec<Option<Part>> =
-        std::mem::take(&mut model.parts).into_iter().map(Some).collect();
-    let planned: Vec<(BlockPlan, Vec<Part>)> = plans
-        .into_iter()
-        .map(|plan| {
-            let parts = plan.parts.iter().filter_map(|&number| parts[number].take()).collect();
-            (plan, parts)
-        })
-        .collect();
-    // Edges that a plan shares with another are not divided where it is: the other would not know.
-    let any_divided = planned.iter().any(|(plan, _)| plan.divide != Division::Whole);
-    let shared = match any_divided && planned.len() > 1 {
-        true => stages.time(Stage::Gather, || shared_by_parts(&planned)),
-        false => FxHashSet::default(),
-    };
-    let materials = &model.materials;
-    let drafting = Drafting { materials, shared: &shared, border, options, rules, stages };
-    let drafts_of = |((plan, parts), stitches)| drafting.drafts(plan, parts, stitches);
-    let drafts: Vec<Vec<Draft>> = planned.into_par_iter().zip(stitches).map(drafts_of).collect();
-    drafts.into_iter().flatten().collect()
-}
-
-/// Positions that the parts of several plans use.
-fn shared_by_parts(planned: &[(BlockPlan, Vec<Part>)]) -> FxHashSet<PositionKey<f64>> {
-    let positions = |plan: usize| {
-        let parts: &[Part] = &planned[plan].1;
-        parts.iter().flat_map(|part| &part.positions).copied()
-    };
-    let bounds: Vec<Bounds> = (0..planned.len()).map(|plan| bounds_of(positions(plan))).collect();
-    shared_positions(&bounds, positions)
-}
-
-/// What dividing a plan needs to know.
-struct Drafting<'a> {
-    materials: &'a [Material],
-    /// Positions that several plans use.
-    shared: &'a FxHashSet<PositionKey<f64>>,
-    border: &'a InputBorder,
-    options: &'a BuildOptions,
-    rules: &'a BodyRules<'a>,
-    stages: &'a Stages,
-}
-
-impl Drafting<'_> {
-    fn drafts(&self, plan: BlockPlan, parts: Vec<Part>, stitches: Vec<Stitch>) -> Vec<Draft> {
-        let &Self { materials, shared, border, options, rules, stages } = self;
-        let BlockPlan { name, divide: division, .. } = plan;
-        let mut drafts = Vec::new();
-        let stray = stages.time(Stage::Gather, || set_outliers_aside(&parts));
-        let (parts, far) = stray.unwrap_or((parts, Vec::new()));
-        if !far.is_empty() {
-            let name = format!("{name} (far off)");
-            let materials = materials_of(far.iter().map(|part| part.material).collect());
-            drafts.push(Draft {
-                name,
-                far: true,
-                source: DraftSource::Parts(far, Vec::new()),
-                materials,
-            });
-        }
-        if division == Division::Whole {
-            let materials = materials_of(parts.iter().map(|part| part.material).collect());
-            let source = DraftSource::Parts(parts, stitches);
-            drafts.push(Draft { name, far: false, source, materials });
-            return drafts;
-        }
-        let mut chunk = stages.time(Stage::Gather, || gather(materials, &parts, &stitches));
-        drop(stitches);
-        drop(parts);
-        border.mark(&mut chunk);
-        keep_shared(&mut chunk, shared);
-        chunk.moved = options.quantize.map(|_| vec![0.0; chunk.mesh.positions.len()]);
-        let most = match division {
-            Division::Halves(most) => {
-                let bodies = stages.time(Stage::Gather, || rules.crowd(&chunk.mesh)).max(1);
-                let share = most.bodies as f64 / bodies as f64;
-                most.triangles.min((chunk.mesh.triangles.len() as f64 * share) as usize)
-            }
-            Division::Whole | Division::Grid { .. } => chunk.mesh.triangles.len(),
+        target.out.write(border_file(&name), &border.to_bytes())?;
+        let mut left_out: Vec<LeftOutNode> = left_out
+            .into_iter()
+            .map(|LeftOut { child_path, triangles, kept }| LeftOutNode {
+                file: file_name(&name, &child_path),
+                triangles,
+                kept,
+            })
+            .collect();
+        left_out.sort_by(|a, b| a.file.cmp(&b.file));
+        let outcomes = outcomes(&trees, &mut warnings);
+        let [people, input] = title;
+        let report = BlockReport {
+            name,
+            made_of,
+            triangles,
+            texels: textures.used_texels(),
+            repeating: textures.repeating(),
+            stitched_edges,
+            outcomes,
+            left_out,
+            warnings: Count::of_warnings(&warnings),
+            texture_warnings: Vec::new(),
         };
-        // The blocks' own factors are not known yet; those of the largest serve all.
-        let resolutions =
-            Resolutions::new(most.min(chunk.mesh.triangles.len()), &options.hierarchy);
-        let shares: Vec<f64> = match options.hierarchy.borders {
-            BorderMode::Locked => vec![1.0],
+        let info = BlockInfo { name: people, input, origin };
+        Ok(Some(BuiltBlock { info, trees, report }))
+    }
+
+    /// The borders that a block has with others.
+    fn faces(&self, crossing: &[Part], cut: &CellCut) -> Vec<FaceBorder> {
+        let triangles: Vec<SideTriangle> = crossing
+            .iter()
+            .flat_map(|part| {
+                let corners = part.indices.as_chunks::<3>().0.iter();
+                corners.map(|corners| SideTriangle::new(part, *corners, self.lattice))
+            })
+            .collect();
+        let rule = self.keep_rule();
+        cut.sides().iter().map(|side| FaceBorder::new(side, &triangles, &rule)).collect()
+    }
+
+    /// As within blocks: triangles go to a share for each step and the length of borders to its root. The
+    /// steps are counted from the leaves, where all blocks are alike.
+    fn keep_rule(&self) -> KeepRule<'static> {
+        let HierarchyOptions { borders, level_factor, constants, .. } =
+            &self.setup.target().options.hierarchy;
+        let factor = f64::from(*level_factor).sqrt();
+        let shares = match borders {
+            BorderMode::Locked => vec![1.0; RANKED_STEPS as usize + 1],
             BorderMode::Skirts => {
-                resolutions.factors().iter().map(|factor| 1.0 / factor.sqrt()).collect()
+                let step = |step: u32| (0..step).fold(1.0, |share, _| share / factor);
+                (0..=RANKED_STEPS).rev().map(step).collect()
             }
         };
-        let constants = &options.hierarchy.constants;
-        let chunks =
-            divide(chunk, division, &shares, options.quantization(), constants, rules, stages);
-        let several = chunks.len() > 1;
-        for (number, chunk) in chunks.into_iter().enumerate() {
-            let materials = materials_of(chunk.mesh.materials.clone());
-            let name = if several { format!("{name} {}", number + 1) } else { name.clone() };
-            let source = DraftSource::Chunk(Box::new(chunk));
-            drafts.push(Draft { name, far: false, source, materials });
-        }
-        drafts
-    }
-}
-
-/// Each material once.
-fn materials_of(mut materials: Vec<u32>) -> Vec<u32> {
-    materials.sort_unstable();
-    materials.dedup();
-    materials
-}
-
-/// One lattice for all blocks of an input, so that blocks that touch agree on where.
-fn lattice_of<'a>(drafts: impl IntoIterator<Item = &'a Draft>) -> Lattice {
-    let (mut extent, mut magnitude) = (0f64, 0f64);
-    for draft in drafts {
-        let (low, high) = draft.source.bounds();
-        for i in 0..3 {
-            extent = extent.max(high[i] - low[i]);
-            magnitude = magnitude.max(low[i].abs()).max(high[i].abs());
+        KeepRule {
+            shares,
+            most: Vec::new(),
+            first_level: 0,
+            collinear: if *borders == BorderMode::Locked { -1.0 } else { self.lattice.step },
+            baked: None,
+            constants: constants.border,
         }
     }
-    Lattice::for_extent(extent, magnitude)
 }
 
-/// The beginning of an input's file names: its name for people, a hash of its path for programs.
-fn file_prefix(input: &Path) -> String {
-    let stem = input.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
-    let plain: String =
-        stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(40).collect();
-    let hash = blake3::hash(crate::builder::inputs::text_of(input).as_bytes()).to_hex();
-    format!("{plain}-{}", &hash.as_str()[..6])
+/// What names a block.
+struct Near {
+    name: String,
+    title: [String; 2],
+    made_of: String,
+}
+
+/// The lattice of what lies at these places.
+fn lattice_of(
+    positions: impl Iterator<Item = [f64; 3]>,
+    quantization: Option<Quantization>,
+) -> Lattice {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for position in positions {
+        for axis in 0..3 {
+            low[axis] = low[axis].min(position[axis]);
+            high[axis] = high[axis].max(position[axis]);
+        }
+    }
+    let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+    let magnitude = low.into_iter().chain(high).fold(0.0, |most: f64, at| most.max(at.abs()));
+    Lattice::for_extent(extent, magnitude).or_coarser(quantization)
+}
+
+/// The part of each triangle that is in a cell.
+fn piece(part: &Part, cut: &CellCut, lattice: Lattice) -> Part {
+    let mut own = Part { group: part.group, material: part.material, ..Part::default() };
+    for &corners in part.indices.as_chunks::<3>().0 {
+        let positions = corners.map(|vertex| part.positions[vertex as usize]);
+        let cut = cut.piece(&Triangle { corners: positions, lattice });
+        if cut.triangles.is_empty() {
+            continue;
+        }
+        let first = own.positions.len() as u32;
+        // In an order of its own, so that what two triangles have in common is one from both.
+        let mut order = [0, 1, 2];
+        order.sort_by_key(|&corner| key(positions[corner]));
+        for place in &cut.places {
+            let mixed = |value: &dyn Fn(usize) -> f64| -> f64 {
+                order.iter().map(|&corner| place.weights[corner] * value(corner)).sum()
+            };
+            own.positions.push(place.position);
+            if !part.texcoords.is_empty() {
+                own.texcoords.push(std::array::from_fn(|i| {
+                    mixed(&|corner| f64::from(part.texcoords[corners[corner] as usize][i])) as f32
+                }));
+            }
+            if !part.colors.is_empty() {
+                own.colors.push(std::array::from_fn(|i| {
+                    mixed(&|corner| f64::from(part.colors[corners[corner] as usize][i])).round()
+                        as u16
+                }));
+            }
+            if !part.normals.is_empty() {
+                own.normals.push(normal(part, corners, order, place.weights));
+            }
+        }
+        own.indices.extend(cut.triangles.as_flattened().iter().map(|&corner| first + corner));
+    }
+    own
+}
+
+fn normal(part: &Part, corners: [u32; 3], order: [usize; 3], weights: [f64; 3]) -> Normal {
+    let mut sum = glam::DVec3::ZERO;
+    for corner in order {
+        if weights[corner] == 0.0 {
+            continue;
+        }
+        let own = part.normals[corners[corner] as usize];
+        if weights[corner] == 1.0 {
+            return own;
+        }
+        match own.vector() {
+            Some(vector) => sum += vector * weights[corner],
+            None => return Normal::NONE,
+        }
+    }
+    Normal::along(sum)
+}
+
+/// How the nodes of a block were made; what was imperfect in them is added to `warnings`.
+fn outcomes(trees: &[Tree<NodeRecord>], warnings: &mut Warnings) -> Vec<Count> {
+    let mut steps = Vec::new();
+    for tree in trees {
+        tree.for_each(&mut |record: &NodeRecord| {
+            let baked = record.baked.filter(|_| record.step.is_some()).map(BakeReason::describe);
+            let texts = record.step.map(LadderStep::describe).into_iter().chain(baked);
+            steps.extend(texts.map(|text| Count { text: text.into(), count: 1 }));
+            warnings.extend(record.warnings.clone());
+        });
+    }
+    most_frequent(steps)
 }

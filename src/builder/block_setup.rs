@@ -1,4 +1,4 @@
-//! What it takes to build nodes from a chunk of a model, of a block or of a district.
+//! What it takes to build nodes from a chunk of a model, of a block or of a node above blocks.
 
 use crate::builder::emit::disk_sink::DiskSink;
 use crate::builder::hierarchy::{BlockBuilder, HierarchyOptions, Resolutions};
@@ -31,6 +31,7 @@ pub struct Target<'a> {
 }
 
 /// How the materials of a model may be treated.
+#[derive(Debug)]
 pub struct Looks {
     /// Which textures are cut up.
     pub textures: TexturePlan,
@@ -43,7 +44,11 @@ pub struct Looks {
 impl Looks {
     /// Of a model whose untextured materials are merged.
     pub fn new(model: &Model) -> Self {
-        let textures = TexturePlan::new(model);
+        Self::of(model, TexturePlan::new(model))
+    }
+
+    /// Of the materials of a model whose textures are used so.
+    pub fn of(model: &Model, textures: TexturePlan) -> Self {
         let is_cut_up = |material: u32| {
             let texture = textures.texture_of(material);
             texture.map(|texture| textures.texture_use(texture)) == Some(TextureUse::Atlas)
@@ -98,6 +103,11 @@ impl<'a> BlockSetup<'a> {
         }
         let reorientable = cache.model().materials.iter().map(reorientable).collect();
         Self { target, up, cache, extrudable, reorientable, hierarchy }
+    }
+
+    /// Where nodes go.
+    pub fn target(&self) -> &Target<'a> {
+        &self.target
     }
 
     /// The pictures of a block of this mesh at all its levels.

@@ -32,30 +32,20 @@ pub struct Constants {
     pub measure: MeasureConstants,
 }
 
-/// How inputs become blocks ([`crate::builder::blocks`]); sizes in budgets, which are
+/// How inputs become blocks ([`crate::builder::partition`]); sizes in budgets, which are
 /// `desired_tris` triangles each.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BlockConstants {
-    /// Groups with fewer budgets are merged with neighbours as small, 0 or more.
-    pub small_group: usize,
-    /// Merged blocks have at most so many budgets, 1 or more.
-    pub merged: usize,
-    /// A group with more budgets is divided, 1 or more (the thesis's blocks have 87 on average).
-    pub large_group: usize,
-    /// A file without groups is divided above so many budgets, and divided blocks have at most as
-    /// many, 1 or more.
+    /// Blocks have at most so many budgets, 1 or more (the thesis's have 87 on average).
     pub divided: usize,
-    /// A block that shares more vertices with others than a budget divided by this is made one with
-    /// them, 1 or more: all of them are there at every level.
-    pub welded: usize,
     /// A separate body with at most the triangles of a block divided by this is not cut, 1 or more.
     pub uncut: usize,
 }
 
 impl Default for BlockConstants {
     fn default() -> Self {
-        Self { small_group: 4, merged: 16, large_group: 400, divided: 128, welded: 8, uncut: 32 }
+        Self { divided: 128, uncut: 32 }
     }
 }
 
@@ -210,10 +200,6 @@ pub struct PrismConstants {
     pub triangles_per_body: usize,
     /// Where it leaves fewer than this, nothing else is tried, 0 or more.
     pub sure: f64,
-    /// Blocks are divided until their roots have at least so many for each body, 0 or more, where
-    /// each of several side by side counts half: with fewer they leave out more than a tenth of the
-    /// ground that is covered.
-    pub least_per_body: f64,
     /// Cells along the side of a square as large as the footprints have for each triangle, over 0.
     pub resolution: f64,
     /// Gaps may be filled that are at most so many times as wide as that square, 0 or more.
@@ -244,7 +230,6 @@ impl Default for PrismConstants {
             cells: 1 << 20,
             triangles_per_body: 16,
             sure: 4.0,
-            least_per_body: 6.0,
             resolution: 5.0,
             gap: 2.0,
             net: 10.0,

@@ -1,18 +1,23 @@
-//! What a result was built from, and whether that has changed.
+//! What a result is built from: looking at inputs, and whether they have changed.
 
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
 use crate::Result;
+use crate::builder::partition::Scan;
+use crate::builder::plan::KnownInput;
+use crate::builder::prepare::{Prepared, Preparing};
+use crate::builder::progress::Progress;
+use crate::builder::reuse::Earlier;
 use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
 use crate::format::check_regular;
-use crate::report::build_report::{FileReport, InputReport};
+use crate::report::build_report::{Count, FileReport, InputReport};
 use crate::stage_timer::StageTimer;
 
 /// Sizes and hashes of the files of an input.
-pub fn describe(
+fn describe(
     dependencies: &[PathBuf],
     sources: &Sources,
     stages: &Stages,
@@ -32,13 +37,52 @@ pub fn unchanged(earlier: &InputReport, sources: &Sources) -> bool {
     !earlier.files.is_empty() && earlier.files.par_iter().all(|file| timer.time(|| is_same(file)))
 }
 
+/// What an earlier result knows of an input that has not changed.
+pub fn known(input: &Path, earlier: Option<&Earlier>, preparing: &Preparing) -> Option<KnownInput> {
+    let known = earlier?.input(&text_of(input))?;
+    let is_same = || unchanged(&known.report, preparing.sources);
+    preparing.stages.time(Stage::Compare, is_same).then(|| known.clone())
+}
+
+/// Reads an input and looks at its triangles; the model is returned too.
+pub fn look_at(
+    input: &Path,
+    preparing: &Preparing,
+    progress: &dyn Progress,
+) -> Result<(KnownInput, Prepared)> {
+    let prepared = preparing.read(input)?;
+    let Prepared { model, up, up_from } = &prepared;
+    let triangles = model.triangle_count() as u64;
+    progress.found(triangles);
+    let per_cluster = preparing.options.most_in_block() as f64 / CLUSTERS;
+    let (scan, files) = rayon::join(
+        || preparing.stages.time(Stage::Gather, || Scan::of(model, per_cluster)),
+        || describe(&model.dependencies, preparing.sources, preparing.stages),
+    );
+    let report = InputReport {
+        path: text_of(input),
+        files: files?,
+        triangles,
+        up: *up,
+        up_from: Some(*up_from),
+        warnings: Count::of_warnings(&model.warnings),
+    };
+    Ok((KnownInput { report, scan }, prepared))
+}
+
+/// Clusters of a block that is as large as blocks may be.
+const CLUSTERS: f64 = 512.0;
+
 /// A path as text, for reports.
 pub fn text_of(path: &Path) -> String {
     path.to_string_lossy().into_owned()
 }
 
 /// A fingerprint of version, parameters and inputs.
-pub fn fingerprint(parameters: &serde_json::Value, inputs: &[InputReport]) -> [u8; 32] {
+pub fn fingerprint<'a>(
+    parameters: &serde_json::Value,
+    inputs: impl Iterator<Item = &'a InputReport>,
+) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     let mut add = |text: &str| {
         hasher.update(&(text.len() as u64).to_le_bytes());
@@ -47,7 +91,6 @@ pub fn fingerprint(parameters: &serde_json::Value, inputs: &[InputReport]) -> [u
     add(env!("CARGO_PKG_VERSION"));
     add(&parameters.to_string());
     for input in inputs {
-        // As given: it is part of the nodes' file names and ids.
         add(&input.path);
         for file in &input.files {
             add(&file.blake3);

@@ -3,19 +3,18 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::builder::plan::KnownInput;
 use crate::builder::reuse::Earlier;
 use crate::builder::subset::Subset;
 use crate::format::{REPORT_FILE, SUBSETS_DIR};
-use crate::report::build_report::{BuildReport, InputReport};
+use crate::report::build_report::BuildReport;
 use crate::{Error, Result};
 
 /// The results of all subsets of one build, which fit together.
 pub struct Subsets {
     results: Vec<Earlier>,
-    /// By input: which of the results has it.
-    of_inputs: BTreeMap<String, usize>,
-    /// All inputs, in order.
-    inputs: Vec<String>,
+    /// By block: which of the results has it.
+    of_blocks: BTreeMap<String, usize>,
 }
 
 impl Subsets {
@@ -24,7 +23,6 @@ impl Subsets {
     pub fn open(out: &Path) -> Result<Self> {
         let subsets = found(out)?;
         let reports = subsets.iter().map(|&at| report(out, at)).collect::<Result<Vec<_>>>()?;
-        let inputs = inputs_of(&reports[0]).to_vec();
         for (&subset, report) in subsets.iter().zip(&reports) {
             fits(subset, report, subsets[0], &reports[0]).map_err(|what| {
                 let what = format!("{what}; run hlod-build --subset {subset} again, as the others");
@@ -32,22 +30,18 @@ impl Subsets {
             })?;
         }
         let mut results = Vec::with_capacity(subsets.len());
-        let mut of_inputs = BTreeMap::new();
+        let mut of_blocks = BTreeMap::new();
         for (&subset, report) in subsets.iter().zip(&reports) {
             let dir = subset.dir(out);
             let result = Earlier::open(&dir, &report.parameters).ok_or_else(|| {
                 let what = "expected a whole result, found files missing, or of another size";
                 Error::input(&dir, format!("{what}; run hlod-build --subset {subset} again"))
             })?;
-            let inputs = result.report.inputs.iter().map(|input| input.path.clone());
-            of_inputs.extend(inputs.map(|input| (input, results.len())));
+            let blocks = result.report.blocks.iter().map(|block| block.name.clone());
+            of_blocks.extend(blocks.map(|block| (block, results.len())));
             results.push(result);
         }
-        if let Some(missing) = inputs.iter().find(|&input| !of_inputs.contains_key(input)) {
-            let what = format!("expected every input in one of them, found {missing} in none");
-            return Err(Error::input(out.join(SUBSETS_DIR), what));
-        }
-        Ok(Self { results, of_inputs, inputs })
+        Ok(Self { results, of_blocks })
     }
 
     /// What all of them were asked for.
@@ -55,21 +49,15 @@ impl Subsets {
         &self.results[0].report.parameters
     }
 
-    /// Texels of repeating textures that the sources use; what several subsets use counts for each.
-    pub fn repeating_texels(&self) -> u64 {
-        let of = |report: &BuildReport| {
-            let regular: u64 = report.inputs.iter().map(|input| input.texels).sum();
-            report.source_texels.saturating_sub(regular)
-        };
-        self.results.iter().map(|result| of(&result.report)).sum()
+    /// All inputs, in order.
+    pub fn inputs(&self) -> &[KnownInput] {
+        self.results[0].inputs()
     }
 
-    /// All inputs in order, each with the result that it is in.
-    pub fn inputs(&self) -> impl Iterator<Item = (&InputReport, &Earlier)> {
-        self.inputs.iter().filter_map(|path| {
-            let result = &self.results[*self.of_inputs.get(path)?];
-            Some((result.input(path)?, result))
-        })
+    /// The result that has a block, if any triangle of it is left, and the block's numbers there.
+    pub fn blocks(&self, name: &str, made_of: &str) -> Option<(&Earlier, &[usize])> {
+        let result = &self.results[*self.of_blocks.get(name)?];
+        Some((result, result.blocks(name, made_of)?))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Everything that a build can be asked for, checked once.
 
-use crate::builder::blocks::plan::BlockMode;
 use crate::builder::hierarchy::HierarchyOptions;
+use crate::builder::partition::BlockSplit;
 use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::bytes::Bytes;
 use crate::format::COPYRIGHT;
@@ -18,7 +18,7 @@ pub struct BuildOptions {
     /// How each block becomes a tree.
     pub hierarchy: HierarchyOptions,
     /// How inputs become blocks.
-    pub blocks: BlockMode,
+    pub blocks: BlockSplit,
     /// The axis that points at the sky; `None` takes the format's word, or looks at the geometry.
     pub up: Option<UpAxis>,
     /// Where the city stands on the Earth.
@@ -38,7 +38,7 @@ pub struct BuildOptions {
     pub normals: bool,
     /// Weight of textured triangles in the cost (`c_textured`), 0–1.
     pub textured_weight: f64,
-    /// Whether there are nodes above the blocks ([`crate::builder::districts`]).
+    /// Whether there are nodes above the blocks ([`crate::builder::upper`]).
     pub districts: bool,
     /// Keep to so many bytes of memory, [`LEAST_MEMORY`] or more: files that are large are built tile by tile
     /// ([`tiling`](crate::import::tiling)). Results are the same for any number, and not those without.
@@ -56,7 +56,7 @@ impl Default for BuildOptions {
     fn default() -> Self {
         Self {
             hierarchy: HierarchyOptions::default(),
-            blocks: BlockMode::Auto,
+            blocks: BlockSplit::Auto,
             up: None,
             placement: Placement::Local,
             copyright: None,
@@ -102,6 +102,12 @@ impl BuildOptions {
     /// The lattice of a quantised build, of options that were checked.
     pub fn quantization(&self) -> Option<Quantization> {
         self.quantize.map(Quantization::not_above)
+    }
+
+    /// The triangles that a block has at most, where the blocks are no grid.
+    pub fn most_in_block(&self) -> u64 {
+        let budgets = self.hierarchy.constants.blocks.divided as u64;
+        budgets * u64::from(self.hierarchy.desired_tris)
     }
 
     /// The parameters that the result depends on, for `scene.hlod` and `build.json`.
@@ -237,7 +243,7 @@ mod tests {
                 borders: BorderMode::Locked,
                 ..HierarchyOptions::default()
             },
-            blocks: BlockMode::Grid(12.5),
+            blocks: BlockSplit::Grid(12.5),
             up: Some(UpAxis::Y),
             placement: Placement::Crs { epsg: 25832, height_offset: 46.5 },
             copyright: Some("© 2024 City; © Survey".into()),

@@ -1,112 +1,178 @@
-//! Which inputs are built, with what borders, and which are taken over from an earlier result.
+//! What is to be built: the partition of all inputs, and what each block is made of.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::ops::Range;
+use std::path::Path;
 
-use crate::Result;
-use crate::builder::inputs::{text_of, unchanged};
-use crate::builder::memory::total_bytes;
-use crate::builder::prepare::{Prepared, Preparing};
-use crate::builder::progress::Progress;
-use crate::builder::reuse::Earlier;
-use crate::builder::stages::Stage;
-use crate::builder::tiles::Tiles;
-use crate::builder::tiles::border::InputBorder;
-use crate::builder::tiles::boxes::boxes;
-use crate::builder::tiles::rim::BoundingBox;
+use crate::builder::options::BuildOptions;
+use crate::builder::partition::{CellBox, Cluster, Partition, Scan};
+use crate::builder::subset::Subset;
+use crate::lattice::Lattice;
+use crate::mesh::UpAxis;
 use crate::report::build_report::InputReport;
+use crate::{Error, Result};
 
-/// Models of inputs that have a share of so much of the memory, as files, are read once.
-const KEPT: u64 = 64;
+/// An input that was looked at.
+#[derive(Clone, Debug)]
+pub struct KnownInput {
+    /// For `build.json`.
+    pub report: InputReport,
+    /// Where its triangles are.
+    pub scan: Scan,
+}
 
-/// What is to be done about each input of a build, or of a share of it.
+/// A block before anything is built.
+#[derive(Clone, Debug)]
+pub struct PlannedBlock {
+    /// Its cell.
+    pub cell: u32,
+    /// What the names of its files begin with.
+    pub name: String,
+    /// The inputs that it may have triangles of, in order.
+    pub inputs: Vec<usize>,
+    /// A hash of all that it is made of.
+    pub made_of: String,
+}
+
+/// What is to be built.
 pub struct Plan {
-    /// What an earlier result knows of those that are taken over from it.
-    pub still_good: Vec<Option<InputReport>>,
-    /// The borders of those that are built.
-    pub borders: Vec<InputBorder>,
-    /// Those of them that were read already.
-    pub prepared: BTreeMap<PathBuf, Prepared>,
+    /// Which axis points at the sky.
+    pub up: UpAxis,
+    /// The cells of all inputs.
+    pub partition: Partition,
+    /// Of all blocks' vertices.
+    pub lattice: Lattice,
+    /// Blocks are too large for the lattice that was asked for.
+    pub is_coarser: bool,
+    /// In order of place.
+    pub blocks: Vec<PlannedBlock>,
 }
 
 impl Plan {
-    /// For `inputs` of all. `subsets` is the folder of all shares, where these are one.
-    pub fn new(
-        all: &[PathBuf],
-        inputs: &[PathBuf],
-        subsets: Option<&Path>,
-        earlier: Option<&Earlier>,
-        preparing: &Preparing,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        let same = |input: &PathBuf| {
-            let report = earlier?.input(&text_of(input))?;
-            unchanged(report, preparing.sources).then(|| report.clone())
+    /// For inputs of which everything is known.
+    pub fn new(inputs: &[KnownInput], up: UpAxis, options: &BuildOptions) -> Self {
+        let clusters = inputs.iter().flat_map(|input| &input.scan.clusters).copied().collect();
+        let partition = Partition::new(clusters, options.blocks, options.most_in_block(), up);
+        let magnitude = inputs.iter().flat_map(|input| input.scan.bounds.as_flattened());
+        let magnitude =
+            magnitude.filter(|at| at.is_finite()).fold(0.0, |most: f64, at| most.max(at.abs()));
+        let cells = partition.cells().iter();
+        let extent = cells.map(|cell| cell.extent).fold(0.0, f64::max);
+        let fine = Lattice::for_extent(extent, magnitude);
+        let quantization = options.quantization();
+        let is_coarser = quantization.is_some_and(|coarse| coarse.step < fine.step);
+        let lattice = fine.or_coarser(quantization);
+        let inputs_of = inputs_of_blocks(&partition, inputs);
+        let numbers = partition.blocks();
+        let planned = |cell: u32| {
+            let of_cell: Vec<usize> = inputs_of.get(&cell)?.iter().copied().collect();
+            Some(planned(cell, of_cell, inputs, &partition, lattice, up))
         };
-        let compare = || inputs.iter().map(same).collect::<Vec<Option<InputReport>>>();
-        let mut still_good = preparing.stages.time(Stage::Compare, compare);
-        if all.len() == 1 {
-            // One among several was on a lattice that it need not be on alone.
-            still_good.iter_mut().for_each(|report| {
-                report.take_if(|known| known.bounds.is_some());
-            });
-            let borders = vec![InputBorder::default(); inputs.len()];
-            return Ok(Self { still_good, borders, prepared: BTreeMap::new() });
-        }
-        let place_of: BTreeMap<&PathBuf, usize> = all.iter().zip(0..).collect();
-        let places: Vec<usize> = inputs.iter().map(|input| place_of[input]).collect();
-        // What is built elsewhere may have changed.
-        let mut known: Vec<Option<BoundingBox>> = vec![None; all.len()];
-        for (&place, report) in places.iter().zip(&still_good) {
-            known[place] = report.as_ref().and_then(|report| report.bounds);
-        }
-        let first = places.first().copied().unwrap_or(0);
-        let boxes = boxes(all, &known, preparing.sources, subsets, first)?;
-        let mut tiles = Tiles::new(all, boxes, preparing.options);
-        let is_changed = |place: usize| known[place].is_none();
-        let place_of: BTreeMap<String, usize> =
-            all.iter().map(|path| text_of(path)).zip(0..).collect();
-        // One that met an input that is gone, too.
-        for (&place, report) in places.iter().zip(&mut still_good) {
-            let is_there = |path: &str| {
-                place_of.get(path).is_some_and(|&other| tiles.are_neighbours(place, other))
-            };
-            report.take_if(|known| {
-                known.bounds.is_none() || !known.meetings.iter().all(|other| is_there(&other.path))
-            });
-        }
-        let near_changed = tiles.neighbours_of((0..all.len()).filter(|&place| is_changed(place)));
-        let in_question = |(&place, report): (&usize, &Option<InputReport>)| {
-            (report.is_none() || near_changed.contains(&place)).then_some(place)
-        };
-        let in_question: BTreeSet<usize> =
-            places.iter().zip(&still_good).filter_map(in_question).collect();
-        // What is read for its border is kept to be built, where all of it is small; all of it is built
-        // together then, which leaves nothing finished before the end.
-        let bytes = |input: &PathBuf| preparing.sources.bytes(input);
-        let memory = preparing.options.max_memory.unwrap_or_else(total_bytes);
-        let is_small = all.iter().map(bytes).sum::<u64>() <= memory / KEPT;
-        let keep = is_small && !preparing.options.resume;
-        let mut prepared: BTreeMap<PathBuf, Prepared> = BTreeMap::new();
-        tiles.read_rims(&in_question, |place, rim| {
-            progress.comparing(&all[place]);
-            let read = preparing.read(&all[place])?;
-            let rim = preparing.stages.time(Stage::Gather, || rim(&read.model));
-            if keep && is_changed(place) {
-                prepared.insert(all[place].clone(), read);
-            }
-            Ok(rim)
-        })?;
-        let mut borders = Vec::with_capacity(inputs.len());
-        for (place, report) in places.iter().zip(&mut still_good) {
-            let border = match in_question.contains(place) {
-                true => tiles.border(*place),
-                false => InputBorder::default(),
-            };
-            report
-                .take_if(|known| in_question.contains(place) && known.meetings != border.meetings);
-            borders.push(border);
-        }
-        Ok(Self { still_good, borders, prepared })
+        let blocks = numbers.into_iter().filter_map(planned).collect();
+        Self { up, partition, lattice, is_coarser, blocks }
     }
+
+    /// The blocks of a subset: they follow one another, and have of triangles about as many as others'.
+    pub fn share(&self, subset: Subset) -> Result<Range<usize>> {
+        if self.blocks.len() < subset.of as usize {
+            return Err(Error::Usage(format!(
+                "--subset {subset}: expected as many subsets as there are blocks at most, found {}",
+                self.blocks.len()
+            )));
+        }
+        let sizes = self.blocks.iter().map(|block| self.partition.cell(block.cell).triangles);
+        Ok(subset.picked(&sizes.collect::<Vec<u64>>()))
+    }
+}
+
+/// The inputs that each block may have triangles of, by cell.
+fn inputs_of_blocks(
+    partition: &Partition,
+    inputs: &[KnownInput],
+) -> BTreeMap<u32, BTreeSet<usize>> {
+    // No body whose middle is in a block reaches out of it by more.
+    let reach = |cell: u32| 0.5 * partition.cell(cell).body_size();
+    let cells = 0..partition.cells().len() as u32;
+    let most = cells.map(reach).fold(0.0, f64::max);
+    let mut all: BTreeMap<u32, BTreeSet<usize>> = BTreeMap::new();
+    for (input, known) in inputs.iter().enumerate() {
+        for Cluster { around: [low, high], .. } in &known.scan.clusters {
+            let around = CellBox { low: low.map(|at| at - most), high: high.map(|at| at + most) };
+            partition.blocks_meeting(&around, &mut |cell| {
+                let (place, reach) = (partition.cell(cell).place, reach(cell));
+                let meets = (0..3).all(|axis| {
+                    high[axis] + reach >= place.low[axis] && low[axis] - reach <= place.high[axis]
+                });
+                if meets {
+                    all.entry(cell).or_default().insert(input);
+                }
+            });
+        }
+    }
+    all
+}
+
+fn planned(
+    cell: u32,
+    inputs_of: Vec<usize>,
+    inputs: &[KnownInput],
+    partition: &Partition,
+    lattice: Lattice,
+    up: UpAxis,
+) -> PlannedBlock {
+    let place = partition.cell(cell).place;
+    let mut hasher = blake3::Hasher::new();
+    let mut add = |place: &CellBox| {
+        for at in place.low.iter().chain(&place.high) {
+            hasher.update(&at.to_le_bytes());
+        }
+    };
+    add(&place);
+    let name = &hasher.finalize().to_hex()[..12];
+    let stem = match inputs_of.iter().map(|&at| stem(&inputs[at])).collect::<BTreeSet<_>>() {
+        stems if stems.len() == 1 => stems.into_iter().next().unwrap_or_default(),
+        _ => "city".into(),
+    };
+    let mut hasher = blake3::Hasher::new();
+    let mut add = |place: &CellBox| {
+        for at in place.low.iter().chain(&place.high) {
+            hasher.update(&at.to_le_bytes());
+        }
+    };
+    add(&place);
+    for axis in 0..3 {
+        for upper in [false, true] {
+            if place.side(axis, upper).is_finite() {
+                for other in partition.beyond(cell, axis, upper) {
+                    add(&partition.cell(other).place);
+                }
+            }
+        }
+    }
+    hasher.update(&lattice.step.to_le_bytes());
+    hasher.update(&[u8::from(up == UpAxis::Y)]);
+    // Which bodies are small is a matter of all blocks around.
+    let extent = partition.cell(cell).extent;
+    let around =
+        CellBox { low: place.low.map(|at| at - extent), high: place.high.map(|at| at + extent) };
+    partition.blocks_meeting(&around, &mut |other| {
+        hasher.update(&partition.cell(other).body_size().to_le_bytes());
+    });
+    for &input in &inputs_of {
+        let report = &inputs[input].report;
+        hasher.update(report.path.as_bytes());
+        for file in &report.files {
+            hasher.update(file.blake3.as_bytes());
+            hasher.update(&file.bytes.to_le_bytes());
+        }
+    }
+    let made_of = hasher.finalize().to_hex().to_string();
+    PlannedBlock { cell, name: format!("{stem}-{name}"), inputs: inputs_of, made_of }
+}
+
+/// The name of an input for people, as file names have it.
+fn stem(input: &KnownInput) -> String {
+    let stem = Path::new(&input.report.path).file_stem().unwrap_or_default();
+    let stem = stem.to_string_lossy().to_lowercase();
+    stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(40).collect()
 }

@@ -1,11 +1,10 @@
-//! An input as it is built: read, its up axis known, in metres, on the lattice of a quantised build.
+//! An input as it is built: read, its up axis known, in metres.
 
 use std::path::Path;
 
 use crate::builder::options::BuildOptions;
 use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
-use crate::lattice::{Lattice, Quantization};
 use crate::mesh::{Model, UpAxis, UpEvidence};
 use crate::place::{Globe, z_up};
 use crate::report::build_report::UpFrom;
@@ -19,10 +18,6 @@ pub struct Prepared {
     pub up: UpAxis,
     /// How that is known.
     pub up_from: UpFrom,
-    /// Triangles of the source.
-    pub triangles: u64,
-    /// Those of them that are thinner than the lattice.
-    pub collapsed: u64,
 }
 
 /// What inputs are prepared with.
@@ -36,16 +31,13 @@ pub struct Preparing<'a> {
     pub globe: Option<&'a Globe>,
     /// Where the time goes.
     pub stages: &'a Stages,
-    /// Inputs of the whole build.
-    pub inputs: usize,
 }
 
 impl Preparing<'_> {
     /// Reads an input.
     pub fn read(&self, input: &Path) -> Result<Prepared> {
-        let &Self { options, sources, globe, stages, inputs } = self;
+        let &Self { options, sources, globe, stages } = self;
         let mut model = stages.time(Stage::Import, || sources.load(input))?;
-        let triangles = model.triangle_count() as u64;
         let (up, up_from) = match (options.up, model.up) {
             (Some(up), _) => (up, UpFrom::Option),
             (None, Some(up)) => (up, UpFrom::Format),
@@ -62,27 +54,10 @@ impl Preparing<'_> {
         };
         options.placement.localise(&mut model, up)?;
         check_place(&model, up, globe)?;
-        let mut collapsed = 0;
         if let Some(quantization) = options.quantization() {
             quantization.check(&model)?;
-            if inputs == 1 {
-                quantization.check_extent(model.bounds())?;
-            }
-            collapsed = stages.time(Stage::Gather, || quantization.snap(&mut model));
-            let (source, step) = (model.source.display(), quantization.step);
-            let what = format!("{source}: triangle thinner than the lattice of {step} m left out");
-            model.warnings.add(what, collapsed);
-        } else if inputs > 1 {
-            // What is one vertex of a block is one vertex where inputs meet.
-            let Lattice { step } = Lattice::for_tile(model.bounds());
-            collapsed = stages.time(Stage::Gather, || Quantization { step }.snap(&mut model));
-            let what = format!(
-                "{}: triangle thinner than its precision ({step:e} m) left out",
-                model.source.display()
-            );
-            model.warnings.add(what, collapsed);
         }
-        Ok(Prepared { model, up, up_from, triangles, collapsed })
+        Ok(Prepared { model, up, up_from })
     }
 }
 

@@ -8,8 +8,6 @@ pub trait Progress: Sync {
     fn reading(&self, _input: &Path, _number: usize, _of: usize) {}
     /// An input that is too large to be read whole is being divided.
     fn dividing(&self, _input: &Path) {}
-    /// An input is being read to see where it meets others.
-    fn comparing(&self, _input: &Path) {}
     /// Triangles that are known of now.
     fn found(&self, _triangles: u64) {}
     /// Source triangles whose leaves are written.

@@ -7,17 +7,19 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use crate::Result;
-use crate::builder::block::BuiltBlock;
+use crate::builder::block::{BuiltBlock, border_file};
+use crate::builder::building::Made;
 use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::hierarchy::Tree;
 use crate::builder::options::same_nodes;
+use crate::builder::plan::KnownInput;
+use crate::builder::scans::known_inputs;
 use crate::format::attributes::Attributes;
-use crate::format::rims::Rims;
 use crate::format::{
     NODES_DIR, NodeId, OutputDir, REPORT_FILE, Scene, SharedTexture, TEXTURES_DIR,
 };
 use crate::mesh::Warnings;
-use crate::report::build_report::{BuildReport, DistrictReport, FileReport, InputReport};
+use crate::report::build_report::{BlockReport, BuildReport, FileReport, UpperReport};
 
 /// A result whose nodes were made by this version with the same parameters, and are whole.
 pub struct Earlier {
@@ -28,12 +30,16 @@ pub struct Earlier {
     pub report: BuildReport,
     /// True where its tileset is whole, and for the same place.
     pub tileset: bool,
-    /// The report of each input, by path.
+    /// What is known of its inputs.
+    inputs: Vec<KnownInput>,
+    /// Those, by path.
     input_of: FxHashMap<String, usize>,
-    /// The roots of each input's blocks, by path, in the scene's order.
-    roots_of: FxHashMap<String, Vec<u32>>,
-    /// The reports of districts, by file.
-    district_of: FxHashMap<String, usize>,
+    /// The roots of each block, in the scene's order.
+    roots_of: Vec<Vec<u32>>,
+    /// Blocks, by what they are made of.
+    block_of: FxHashMap<String, Vec<usize>>,
+    /// The reports of nodes above blocks, by file.
+    upper_of: FxHashMap<String, usize>,
     /// Nodes, by file.
     node_of: FxHashMap<String, u32>,
     /// Entries of the report on nodes over their budget, by id.
@@ -43,14 +49,6 @@ pub struct Earlier {
 fn is_as_written(dir: &Path, file: &FileReport) -> bool {
     crate::format::read_regular(&dir.join(&file.path))
         .is_ok_and(|bytes| FileReport::of(&file.path, &bytes) == *file)
-}
-
-/// What an unchanged input contributes.
-pub struct Taken {
-    /// Its blocks; their files are in the new output already.
-    pub blocks: Vec<BuiltBlock>,
-    /// Shared textures that its nodes use, by name; likewise.
-    pub shared_textures: BTreeMap<String, SharedTexture>,
 }
 
 impl Earlier {
@@ -77,21 +75,34 @@ impl Earlier {
         let tileset = !report.tilesets.is_empty()
             && report.parameters == *parameters
             && report.tilesets.par_iter().all(|file| is_as_written(dir, file));
-        let mut roots_of: FxHashMap<String, Vec<u32>> = FxHashMap::default();
+        if report.blocks.len() != scene.blocks.len() {
+            return None;
+        }
+        let borders = |block: &BlockReport| dir.join(border_file(&block.name)).is_file();
+        if !report.blocks.iter().all(borders) {
+            return None;
+        }
+        let mut roots_of: Vec<Vec<u32>> = vec![Vec::new(); scene.blocks.len()];
         for root in scene.block_roots() {
             if let Some(block) = scene.nodes[root as usize].block {
-                let input = scene.blocks[block as usize].input.clone();
-                roots_of.entry(input).or_default().push(root);
+                roots_of[block as usize].push(root);
             }
         }
-        let inputs = report.inputs.iter().map(|input| input.path.clone());
-        let districts = report.districts.iter().map(|district| district.file.clone());
+        let mut block_of: FxHashMap<String, Vec<usize>> = FxHashMap::default();
+        for (number, block) in report.blocks.iter().enumerate() {
+            block_of.entry(block.made_of.clone()).or_default().push(number);
+        }
+        let inputs = known_inputs(dir, &report.inputs)?;
+        let paths = inputs.iter().map(|input| input.report.path.clone());
+        let uppers = report.above.iter().map(|upper| upper.file.clone());
         let nodes = scene.nodes.iter().map(|node| node.file.clone());
         Some(Self {
             dir: dir.to_path_buf(),
-            input_of: inputs.zip(0..).collect(),
+            input_of: paths.zip(0..).collect(),
+            inputs,
             roots_of,
-            district_of: districts.zip(0..).collect(),
+            block_of,
+            upper_of: uppers.zip(0..).collect(),
             node_of: nodes.zip(0..).collect(),
             over_budget_of: report.over_budget.iter().map(|over| over.id).zip(0..).collect(),
             scene,
@@ -106,26 +117,42 @@ impl Earlier {
     }
 
     /// What it knows of an input.
-    pub fn input(&self, path: &str) -> Option<&InputReport> {
-        self.input_of.get(path).map(|&at| &self.report.inputs[at])
+    pub fn input(&self, path: &str) -> Option<&KnownInput> {
+        self.input_of.get(path).map(|&at| &self.inputs[at])
     }
 
-    /// Links the files of an input's blocks into the new output.
-    pub fn take_over(&self, input: &InputReport, output: &OutputDir) -> Result<Taken> {
-        let mut taken = Taken { blocks: Vec::new(), shared_textures: BTreeMap::new() };
-        // A block may have several roots, which may be in different districts.
-        let mut blocks: BTreeMap<u32, BuiltBlock> = BTreeMap::new();
-        for &root in self.roots_of.get(&input.path).into_iter().flatten() {
-            let Some(block) = self.scene.nodes[root as usize].block else { continue };
-            let info = &self.scene.blocks[block as usize];
-            let tree = self.tree(root, output, &mut taken)?;
-            let built = blocks.entry(block);
-            let new = || BuiltBlock { info: info.clone(), trees: Vec::new() };
-            built.or_insert_with(new).trees.push(tree);
+    /// What it knows of all inputs, in order.
+    pub fn inputs(&self) -> &[KnownInput] {
+        &self.inputs
+    }
+
+    /// The blocks of a name that are made of this, and what lies far off beside it.
+    pub fn blocks(&self, name: &str, made_of: &str) -> Option<&[usize]> {
+        let numbers = self.block_of.get(made_of)?;
+        let is_of = |&number: &usize| self.report.blocks[number].name.starts_with(name);
+        numbers.iter().all(is_of).then_some(numbers)
+    }
+
+    /// Links the files of a block into the new output.
+    pub fn take_over(
+        &self,
+        number: usize,
+        cell: u32,
+        output: &OutputDir,
+        made: &mut Made,
+    ) -> Result<()> {
+        let mut textures = BTreeMap::new();
+        let mut trees = Vec::new();
+        for &root in &self.roots_of[number] {
+            trees.push(self.tree(root, output, &mut textures)?);
         }
-        taken.blocks = blocks.into_values().collect();
-        self.link_textures(taken.shared_textures.keys(), output)?;
-        Ok(taken)
+        self.link_textures(textures.keys(), output)?;
+        made.reused_textures.extend(textures);
+        let report = self.report.blocks[number].clone();
+        output.reuse(&self.dir, border_file(&report.name))?;
+        let info = self.scene.blocks[number].clone();
+        made.blocks.entry(cell).or_default().push(BuiltBlock { info, trees, report });
+        Ok(())
     }
 
     /// Links shared textures into the new output that are not there yet: several nodes may have one.
@@ -143,48 +170,50 @@ impl Earlier {
         Ok(())
     }
 
-    /// The rims of its districts; none where it has none that can be read, and all are found out again.
-    pub fn rims(&self) -> Rims {
-        Rims::read(&self.dir).unwrap_or_default()
-    }
-
-    /// Links the file of a district into the new output, where it is made of what it was made of then.
-    pub fn take_over_district(
+    /// Links the file of a node above blocks into the new output, where it is made of what it was made of then.
+    pub fn take_over_upper(
         &self,
-        district: &DistrictReport,
+        upper: &UpperReport,
         output: &OutputDir,
     ) -> Result<Option<(NodeRecord, BTreeMap<String, SharedTexture>)>> {
-        let known = self.district_of.get(&district.file).map(|&at| &self.report.districts[at]);
-        let Some(&index) = self.node_of.get(&district.file).filter(|_| known == Some(district))
-        else {
+        let known = self.upper_of.get(&upper.file).map(|&at| &self.report.above[at]);
+        let Some(&index) = self.node_of.get(&upper.file).filter(|_| known == Some(upper)) else {
             return Ok(None);
         };
-        let mut taken = Taken { blocks: Vec::new(), shared_textures: BTreeMap::new() };
-        let record = self.record(index, output, &mut taken)?;
-        Ok(Some((record, taken.shared_textures)))
+        let mut textures = BTreeMap::new();
+        let record = self.record(index, output, &mut textures)?;
+        Ok(Some((record, textures)))
     }
 
-    fn tree(&self, index: u32, output: &OutputDir, taken: &mut Taken) -> Result<Tree<NodeRecord>> {
+    fn tree(
+        &self,
+        index: u32,
+        output: &OutputDir,
+        textures: &mut BTreeMap<String, SharedTexture>,
+    ) -> Result<Tree<NodeRecord>> {
         let children = self
             .scene
             .children(index)
-            .map(|child| self.tree(child, output, taken))
+            .map(|child| self.tree(child, output, textures))
             .collect::<Result<Vec<_>>>()?;
-        Ok(Tree { record: self.record(index, output, taken)?, children })
+        Ok(Tree { record: self.record(index, output, textures)?, children })
     }
 
     /// A node, its file linked into the new output.
-    fn record(&self, index: u32, output: &OutputDir, taken: &mut Taken) -> Result<NodeRecord> {
+    fn record(
+        &self,
+        index: u32,
+        output: &OutputDir,
+        textures: &mut BTreeMap<String, SharedTexture>,
+    ) -> Result<NodeRecord> {
         let node = &self.scene.nodes[index as usize];
         output.reuse(&self.dir, format!("{NODES_DIR}/{}", node.file))?;
-        let mut shared = Vec::new();
+        let mut shared = BTreeMap::new();
         for &number in &node.shared_textures {
             let texture = &self.scene.shared_textures[number as usize];
-            shared.push((
-                texture.file_name.clone(),
-                u64::from(texture.width) * u64::from(texture.height),
-            ));
-            taken.shared_textures.insert(texture.file_name.clone(), texture.clone());
+            let texels = u64::from(texture.width) * u64::from(texture.height);
+            shared.insert(texture.file_name.clone(), texels);
+            textures.insert(texture.file_name.clone(), texture.clone());
         }
         let over = self.over_budget_of.get(&node.id).map(|&at| &self.report.over_budget[at]);
         // In order of id.

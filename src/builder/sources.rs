@@ -15,7 +15,7 @@ use crate::{Result, import};
 
 /// Where inputs are read from.
 ///
-/// Tiles of a file are inputs like others, that touch ([`tiles`](crate::builder::tiles)). Their paths are not
+/// Tiles of a file are inputs like others. Their paths are not
 /// those of files: they lie below that of the file that they are of, as if it were a folder.
 #[derive(Debug, Default)]
 pub struct Sources {

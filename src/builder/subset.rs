@@ -1,13 +1,11 @@
-//! A share of a build's inputs, so that several machines build one result.
+//! A share of a build's blocks, so that several machines build one result.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::builder::sources::Sources;
 use crate::format::SUBSETS_DIR;
-use crate::{Error, Result};
 
-/// One of so many shares of a build's inputs: `3/8` is the third of eight.
+/// One of so many shares of a build's blocks: `3/8` is the third of eight.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
 )]
@@ -54,22 +52,9 @@ impl Subset {
         subset.filter(|subset: &Self| subset.dir(Path::new("")).ends_with(name))
     }
 
-    /// Those of all inputs that are of this share: the same on every machine that sees the same files.
-    /// They follow one another, since names of tiles that do so are mostly those of neighbours, whose common
-    /// borders then are of one share; of bytes all have about the same.
-    pub fn pick(self, inputs: &[PathBuf], sources: &Sources) -> Result<Vec<PathBuf>> {
-        if inputs.len() < self.of as usize {
-            return Err(Error::Usage(format!(
-                "--subset {self}: expected as many subsets as there are inputs at most, found {}",
-                inputs.len()
-            )));
-        }
-        let sizes: Vec<u64> = inputs.iter().map(|input| sources.bytes(input)).collect();
-        Ok(inputs[self.picked(&sizes)].to_vec())
-    }
-
-    /// The places of those of this share among inputs of so many bytes. Each share has one at least.
-    fn picked(self, sizes: &[u64]) -> Range<usize> {
+    /// The places of those of this share among things of so many triangles or bytes. Each share has one at
+    /// least.
+    pub fn picked(self, sizes: &[u64]) -> Range<usize> {
         // Empty files are shared out evenly too.
         let sizes: Vec<u64> = sizes.iter().map(|size| size + 1).collect();
         let (mut first, mut rest) = (0, sizes.iter().sum::<u64>());

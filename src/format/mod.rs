@@ -7,7 +7,8 @@
 //! out/tileset.json    the same for viewers that read 3D Tiles
 //! out/tilesets/*      regions of it, where the city is large
 //! out/build.json      what the build did, for people and scripts
-//! out/rims.hlod       where districts end, for the next build: Rims
+//! out/borders/         the borders of blocks, for the next build
+//! out/scans.hlod       where triangles of inputs are, for the next build
 //! out/cells.hlod      cells in which viewers are, where such were prepared: Cells
 //! out/cells/*.glb     what is far from each of them, as pictures with depth
 //! ```
@@ -33,7 +34,6 @@ mod output_dir;
 mod output_dir_tests;
 mod quantized;
 mod regular_file;
-pub mod rims;
 mod scene;
 mod scene_check;
 mod scene_read;
@@ -66,8 +66,10 @@ pub const TILESET_FILE: &str = "tileset.json";
 pub const TILESETS_DIR: &str = "tilesets";
 /// The folder of results of subsets inside an output folder, until they are merged.
 pub const SUBSETS_DIR: &str = "subsets";
-/// Of [`SUBSETS_DIR`], the folder of where inputs are, as those who build shares of them have found.
-pub const BOXES_DIR: &str = "boxes";
+/// The folder of blocks' borders inside an output folder, which the next build needs and no viewer.
+pub const BORDERS_DIR: &str = "borders";
+/// Where triangles of inputs are, inside an output folder, which the next build needs and no viewer.
+pub const SCANS_FILE: &str = "scans.hlod";
 /// The scene description inside an output folder.
 pub const SCENE_FILE: &str = "scene.hlod";
 /// The folder of node files inside an output folder.

@@ -12,16 +12,17 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::{
-    BOXES_DIR, NODES_DIR, REPORT_FILE, SCENE_FILE, SCENE_MAGIC, SUBSETS_DIR, TEXTURES_DIR,
-    TILESET_FILE, TILESETS_DIR,
+    BORDERS_DIR, NODES_DIR, REPORT_FILE, SCANS_FILE, SCENE_FILE, SCENE_MAGIC, SUBSETS_DIR,
+    TEXTURES_DIR, TILESET_FILE, TILESETS_DIR,
     cells::{CELLS_DIR, CELLS_FILE},
-    rims::RIMS_FILE,
 };
 use crate::builder::Subset;
 use crate::{Error, Result};
 
 /// The folder of shared textures in results of versions whose node files named `../textures/`.
 const EARLIER_TEXTURES_DIR: &str = "textures";
+/// Where nodes above blocks ended, in results of versions that had to know it.
+const EARLIER_RIMS_FILE: &str = "rims.hlod";
 /// Extensions of shared textures.
 const IMAGE_KINDS: &[&str] = &["jpg", "png"];
 
@@ -313,10 +314,12 @@ fn sorted_names(listing: fs::ReadDir) -> io::Result<Vec<OsString>> {
 fn first_foreign(target: &Path, names: &[OsString]) -> Option<PathBuf> {
     names.iter().find_map(|name| {
         let kinds: &[&str] = match name.to_str() {
-            Some(SCENE_FILE | REPORT_FILE | TILESET_FILE | RIMS_FILE | CELLS_FILE) => return None,
+            Some(SCENE_FILE | REPORT_FILE | TILESET_FILE | SCANS_FILE | CELLS_FILE) => return None,
+            Some(EARLIER_RIMS_FILE) => return None,
             Some(NODES_DIR | CELLS_DIR) => &["glb"],
             Some(EARLIER_TEXTURES_DIR) => IMAGE_KINDS,
             Some(TILESETS_DIR) => &["json"],
+            Some(BORDERS_DIR) => &["border"],
             Some(SUBSETS_DIR) if is_of_subsets(&target.join(name)) => return None,
             _ => return Some(name.into()),
         };
@@ -350,10 +353,6 @@ fn is_of_subsets(folder: &Path) -> bool {
                 Subset::of_dir(subset).is_some()
                     && (rest.starts_with(PARTIAL) || rest.starts_with(ASIDE))
             }
-            None if name == BOXES_DIR => {
-                let boxes = fs::read_dir(folder.join(&*name)).and_then(sorted_names);
-                boxes.is_ok_and(|boxes| boxes.iter().all(|name| is_box(&name.to_string_lossy())))
-            }
             None => {
                 Subset::of_dir(&name).is_some()
                     && begins_with_magic(&folder.join(&*name).join(SCENE_FILE))
@@ -361,11 +360,6 @@ fn is_of_subsets(folder: &Path) -> bool {
         }
     };
     names.iter().all(is_ours)
-}
-
-/// Whether a file is a box, or what is left of one that was being written.
-fn is_box(name: &str) -> bool {
-    name.ends_with(".json") || name.starts_with(".tmp")
 }
 
 fn begins_with_magic(path: &Path) -> bool {

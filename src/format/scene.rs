@@ -126,7 +126,7 @@ impl Scene {
         self.nodes.iter().zip(0..).filter(|(node, _)| node.parent.is_none()).map(|(_, index)| index)
     }
 
-    /// Indices of the coarsest nodes of blocks, in order: of those with none above, or a district.
+    /// Indices of the coarsest nodes of blocks, in order: of those with none above, or a node above blocks.
     pub fn block_roots(&self) -> impl Iterator<Item = u32> {
         let is_root = |node: &Node| {
             let above = node.parent.and_then(|parent| self.nodes.get(parent as usize)?.block);
@@ -136,7 +136,7 @@ impl Scene {
     }
 
     /// Indices of nodes that stand for all of the scene: the coarsest of blocks, or where these have more
-    /// than so many triangles together, districts of the least errors for so many. In order.
+    /// than so many triangles together, nodes above blocks of the least errors for so many. In order.
     pub fn coarse_front(&self, most_triangles: u64) -> Vec<u32> {
         let node = |index: u32| &self.nodes[index as usize];
         // Positive floats order as their bits do; equal errors go by index.
@@ -148,8 +148,8 @@ impl Scene {
         while let Some((_, index)) = open.pop() {
             let finer: u64 = self.children(index).map(triangles).sum();
             let after = all.saturating_sub(triangles(index)) + finer;
-            let is_district = node(index).block.is_none() && node(index).first_child.is_some();
-            if is_district && after <= most_triangles {
+            let is_above_blocks = node(index).block.is_none() && node(index).first_child.is_some();
+            if is_above_blocks && after <= most_triangles {
                 all = after;
                 open.extend(self.children(index).map(keyed));
             } else {

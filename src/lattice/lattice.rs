@@ -28,16 +28,6 @@ impl Lattice {
         Self { step: 2f64.powi(exponent.max(finest).max(-100)) }
     }
 
-    /// That of an input among several, within these least and greatest coordinates: as fine as f32 is over all
-    /// of it, or over a kilometre of it. Its vertices are on this before anything is cut, and its blocks' lattice
-    /// is no finer: what is one vertex of a block is one where inputs meet. Those of blocks larger than that are
-    /// rounded twice.
-    pub fn for_tile([low, high]: [[f64; 3]; 2]) -> Self {
-        let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
-        let magnitude = low.into_iter().chain(high).fold(0.0, |most: f64, at| most.max(at.abs()));
-        Self::for_extent(extent.min(1000.0), magnitude)
-    }
-
     /// The coarser of two lattices.
     pub fn coarser(self, other: Self) -> Self {
         Self { step: self.step.max(other.step) }

@@ -1,5 +1,6 @@
 //! `build.json`: how a result was made and what it is made of.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -20,15 +21,16 @@ pub struct BuildReport {
     pub version: String,
     /// What it was asked for; the same as [`Scene::parameters`](crate::format::Scene).
     pub parameters: serde_json::Value,
-    /// Where it is of a share of the inputs alone: of which, and what all of them are.
+    /// Where it is of a share of the blocks alone: of which, and what all inputs are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub subset: Option<SubsetReport>,
     /// What it was built from, in order of path, so that the order of the arguments changes nothing.
     pub inputs: Vec<InputReport>,
+    /// Its blocks, in the order of the scene's.
+    pub blocks: Vec<BlockReport>,
     /// Triangles of all inputs after import.
     pub source_triangles: u64,
-    /// Different texels of the source that its triangles use. Of repeating textures only those
-    /// of the inputs that were built, not of those that were taken over.
+    /// Different texels of the source that its triangles use.
     pub source_texels: u64,
     /// One entry a level, the roots' first.
     pub levels: Vec<LevelReport>,
@@ -57,32 +59,62 @@ pub struct BuildReport {
     pub baked: Vec<Baked>,
     /// Nodes above the blocks, in order of their files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub districts: Vec<DistrictReport>,
+    pub above: Vec<UpperReport>,
     /// What was imperfect and how often, in the order in which it was met.
     pub warnings: Vec<Count>,
 }
 
-/// Which share of a build's inputs a result is of.
+/// Which share of a build's blocks a result is of.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SubsetReport {
     /// Which of how many.
     #[serde(flatten)]
     pub subset: Subset,
-    /// Paths of the inputs of all of them, in order.
+    /// Paths of all inputs, in order.
     pub all_inputs: Vec<String>,
 }
 
 /// A node above the blocks.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct DistrictReport {
+pub struct UpperReport {
     /// Its file.
     pub file: String,
-    /// BLAKE3 of all that it is made of, in hexadecimal: its members' files and their borders with
-    /// other districts.
+    /// BLAKE3 of all that it is made of, in hexadecimal: the files below it and its borders.
     pub made_of: String,
 }
 
-/// An input of the command line. Whoever takes over its nodes takes over all of this with them.
+/// A block. Whoever takes over its nodes takes over all of this with them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BlockReport {
+    /// What the names of its files begin with.
+    pub name: String,
+    /// BLAKE3 of all that it is made of, in hexadecimal: its inputs' files, its place, and where others
+    /// meet it.
+    pub made_of: String,
+    /// Triangles of the source that it has or has parts of.
+    pub triangles: u64,
+    /// Different texels that its triangles use, repeating textures aside.
+    pub texels: u64,
+    /// Its repeating textures, by a hash of each image: their texels.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub repeating: BTreeMap<String, u64>,
+    /// Open edges of it that touch other borders without sharing vertices, and are joined with them
+    /// on all levels but the leaves'.
+    #[serde(default)]
+    pub stitched_edges: u64,
+    /// How often each step of the ladder made one of its nodes, most frequent first.
+    pub outcomes: Vec<Count>,
+    /// Coarse nodes that are not written, by file.
+    #[serde(default)]
+    pub left_out: Vec<LeftOutNode>,
+    /// What was imperfect in it and how often, in the order in which it was met.
+    pub warnings: Vec<Count>,
+    /// What was imperfect in its textures, which other blocks may have too.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub texture_warnings: Vec<String>,
+}
+
+/// An input of the command line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InputReport {
     /// As given, or as found in a given folder.
@@ -91,53 +123,13 @@ pub struct InputReport {
     pub files: Vec<FileReport>,
     /// Its triangles after import.
     pub triangles: u64,
-    /// Different texels that its triangles use, repeating textures aside.
-    pub texels: u64,
-    /// Open edges of it that touch other borders without sharing vertices, and are joined with them
-    /// on all levels but the leaves'.
-    #[serde(default)]
-    pub stitched_edges: u64,
-    /// Where planes divided it into blocks, in order: there its districts may meet.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub cuts: Vec<BlockCut>,
-    /// Least and greatest coordinates of its vertices, as its file has them; `None` where it is the only
-    /// input.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub bounds: Option<[[f64; 3]; 2]>,
-    /// The inputs that it touches, in order.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub meetings: Vec<MeetingReport>,
     /// Which of its axes points at the sky.
     pub up: UpAxis,
     /// How that is known; `None` in results of versions that did not say.
     #[serde(default)]
     pub up_from: Option<UpFrom>,
-    /// How often each step of the ladder made one of its nodes, most frequent first.
-    pub outcomes: Vec<Count>,
-    /// Coarse nodes that are not written, by file.
-    #[serde(default)]
-    pub left_out: Vec<LeftOutNode>,
     /// What was imperfect in it and how often, in the order in which it was met.
     pub warnings: Vec<Count>,
-}
-
-/// Another input that an input touches.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MeetingReport {
-    /// The other input.
-    pub path: String,
-    /// A hash of what both have in common, as this one has it: while it is the same, the input need not be
-    /// built again.
-    pub hash: String,
-}
-
-/// A plane that divided an input into blocks, or along which it touches another.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BlockCut {
-    /// The axis that it is across: 0, 1 or 2.
-    pub axis: usize,
-    /// Where it meets that axis, in source coordinates.
-    pub coordinate: f64,
 }
 
 /// A file that was read.
@@ -280,6 +272,18 @@ impl Count {
     pub fn of_warnings(warnings: &Warnings) -> Vec<Self> {
         warnings.iter().map(|(text, count)| Self { text: text.into(), count }).collect()
     }
+}
+
+/// Sums up equal texts; the most frequent first, then by text.
+pub fn most_frequent(counts: impl IntoIterator<Item = Count>) -> Vec<Count> {
+    let mut sums: BTreeMap<String, u64> = BTreeMap::new();
+    for Count { text, count } in counts {
+        *sums.entry(text).or_insert(0) += count;
+    }
+    let mut sums: Vec<Count> =
+        sums.into_iter().map(|(text, count)| Count { text, count }).collect();
+    sums.sort_by_key(|sum| std::cmp::Reverse(sum.count));
+    sums
 }
 
 /// A node that missed its budget.

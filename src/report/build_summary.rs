@@ -72,14 +72,14 @@ fn summary(report: &BuildReport, out: &Path, rate: &str) -> String {
         report.peak_memory_bytes as f64 / 1e6
     );
     let _ = writeln!(text, "  {}", orientation(report));
-    let stitched: u64 = report.inputs.iter().map(|input| input.stitched_edges).sum();
+    let stitched: u64 = report.blocks.iter().map(|block| block.stitched_edges).sum();
     if stitched > 0 {
         let _ = writeln!(
             text,
             "  {stitched} border edges touch others without shared vertices: joined on coarse levels"
         );
     }
-    let left_out: usize = report.inputs.iter().map(|input| input.left_out.len()).sum();
+    let left_out: usize = report.blocks.iter().map(|block| block.left_out.len()).sum();
     if left_out > 0 {
         let nodes = if left_out == 1 { "node" } else { "nodes" };
         let _ = writeln!(

@@ -1,5 +1,6 @@
 //! The textures of one block: what its nodes copy their texels from.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -257,9 +258,20 @@ impl<'a> BlockTextures<'a> {
     }
 
     /// The number of different source texels that the block's triangles use, of textures that are
-    /// cut up. Those of repeating ones are in [`SharedTextures::source_texels`].
+    /// cut up.
     pub fn used_texels(&self) -> u64 {
         self.used_texels
+    }
+
+    /// The textures that are kept whole: a hash of each image, and its texels.
+    pub fn repeating(&self) -> BTreeMap<String, u64> {
+        let repeating = |prepared: &Prepared| match prepared {
+            Prepared::Repeating(decoded) => {
+                Some((decoded.hash().to_hex().to_string(), decoded.image.texels()))
+            }
+            _ => None,
+        };
+        self.textures.iter().filter_map(repeating).collect()
     }
 }
 

@@ -1,10 +1,15 @@
 //! Decoded images, shared between the blocks that use them and dropped after the last.
 
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use rustc_hash::FxHashMap;
 
 use super::plan::TexturePlan;
 use crate::decode::{self, DecodedTexture};
-use crate::mesh::{Model, Warnings};
+use crate::mesh::{Model, TextureData, TextureSource, Warnings};
 
 /// A decoded image and what names it.
 #[derive(Debug)]
@@ -31,20 +36,113 @@ impl Decoded {
     }
 }
 
-/// The images of one input. Each is decoded when the first block takes it, and let go of when
-/// the last one has taken it.
+/// What an image is decoded from, and how.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct ImageKey {
+    data: ImageData,
+    opacity: Option<PathBuf>,
+    needs_alpha: bool,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+enum ImageData {
+    File(PathBuf),
+    /// Where the bytes are in memory: a slot keeps them there.
+    Embedded(usize),
+}
+
+impl ImageKey {
+    fn of(source: &TextureSource, needs_alpha: bool) -> Self {
+        let data = match &source.data {
+            TextureData::File(path) => ImageData::File(path.clone()),
+            TextureData::Embedded(bytes) => ImageData::Embedded(bytes.as_ptr().addr()),
+        };
+        Self { data, opacity: source.opacity.clone(), needs_alpha }
+    }
+}
+
+/// The decoded images of a build. Each is decoded when the first block takes it, and let go of when all
+/// that have announced themselves have taken it.
+#[derive(Debug, Default)]
+pub struct DecodedImages {
+    slots: Mutex<FxHashMap<ImageKey, Arc<Slot>>>,
+}
+
+/// The images that a block is going to take.
+#[derive(Debug)]
+pub struct Announced<'a> {
+    images: &'a DecodedImages,
+    /// By texture; `None` of those that it does not take.
+    slots: Vec<Option<(ImageKey, Arc<Slot>)>>,
+    is_taken: Vec<AtomicBool>,
+}
+
+impl DecodedImages {
+    /// Announces a block that uses these materials of a model (in any order, repeats allowed).
+    pub fn announce(
+        &self,
+        model: &Model,
+        plan: &TexturePlan,
+        materials: impl IntoIterator<Item = u32>,
+    ) -> Announced<'_> {
+        let mut slots = Vec::new();
+        slots.resize_with(plan.texture_count(), || None);
+        let mut all = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+        for texture in plan.textures_of(materials) {
+            let source = &model.textures[texture as usize];
+            let key = ImageKey::of(source, plan.needs_alpha(texture));
+            let slot = all.entry(key.clone()).or_insert_with(|| {
+                Arc::new(Slot { _source: Some(source.clone()), ..Slot::default() })
+            });
+            slot.takers.fetch_add(1, Ordering::Relaxed);
+            slots[texture as usize] = Some((key, Arc::clone(slot)));
+        }
+        let is_taken = slots.iter().map(|_| AtomicBool::new(false)).collect();
+        Announced { images: self, slots, is_taken }
+    }
+
+    /// One taker less. Takers are counted under the lock of all slots.
+    fn leave(&self, key: &ImageKey, slot: &Slot) {
+        let is_last = {
+            let mut all = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+            let is_last = slot.takers.fetch_sub(1, Ordering::Relaxed) == 1;
+            if is_last {
+                all.remove(key);
+            }
+            is_last
+        };
+        if is_last {
+            slot.image.lock().unwrap_or_else(PoisonError::into_inner).0 = State::Waiting;
+        }
+    }
+}
+
+impl Drop for Announced<'_> {
+    fn drop(&mut self) {
+        for (slot, is_taken) in self.slots.iter().zip(&self.is_taken) {
+            if let (Some((key, slot)), false) = (slot, is_taken.load(Ordering::Relaxed)) {
+                self.images.leave(key, slot);
+            }
+        }
+    }
+}
+
+/// The images of one block.
 #[derive(Debug)]
 pub struct TextureCache<'a> {
     model: &'a Model,
     plan: &'a TexturePlan,
-    slots: Vec<Mutex<Slot>>,
+    announced: &'a Announced<'a>,
+    /// Of each texture that was taken.
+    found: Mutex<BTreeMap<u32, (Option<String>, Findings)>>,
 }
 
 #[derive(Debug, Default)]
 struct Slot {
-    takers: u32,
-    state: State,
-    findings: Findings,
+    /// Keeps embedded bytes where they are.
+    _source: Option<TextureSource>,
+    takers: AtomicU32,
+    image: Mutex<(State, Findings)>,
 }
 
 /// The faults of a decoded image.
@@ -65,26 +163,14 @@ enum State {
 }
 
 /// True of an OBJ, whose materials use the alpha channel of a texture where they say so.
-fn is_obj(model: &Model) -> bool {
-    model.source.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"))
+fn is_obj(source: &Path) -> bool {
+    source.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"))
 }
 
 impl<'a> TextureCache<'a> {
-    /// A cache for blocks that use these materials (one list a block, in any order, repeats
-    /// allowed). Decodes nothing yet.
-    pub fn new<M: IntoIterator<Item = u32>>(
-        model: &'a Model,
-        plan: &'a TexturePlan,
-        blocks: impl IntoIterator<Item = M>,
-    ) -> Self {
-        let mut slots: Vec<Slot> = Vec::new();
-        slots.resize_with(plan.texture_count(), Slot::default);
-        for materials in blocks {
-            for texture in plan.textures_of(materials) {
-                slots[texture as usize].takers += 1;
-            }
-        }
-        Self { model, plan, slots: slots.into_iter().map(Mutex::new).collect() }
+    /// Those that were announced, of a model. Decodes nothing yet.
+    pub fn new(model: &'a Model, plan: &'a TexturePlan, announced: &'a Announced<'a>) -> Self {
+        Self { model, plan, announced, found: Mutex::default() }
     }
 
     /// The model whose images these are.
@@ -97,21 +183,27 @@ impl<'a> TextureCache<'a> {
         self.plan
     }
 
-    /// The image, decoded now if it is not yet; `None` where it cannot be. To be called once
-    /// for each block that was announced.
+    /// The image, decoded now if it is not yet; `None` where it cannot be. To be called once.
     pub(crate) fn take(&self, texture: u32) -> Option<Arc<Decoded>> {
-        let slot = self.slots.get(texture as usize)?;
-        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
-        slot.takers = slot.takers.saturating_sub(1);
-        if matches!(slot.state, State::Waiting) {
-            (slot.state, slot.findings) = self.decode(texture);
+        let (key, slot) = self.announced.slots.get(texture as usize)?.as_ref()?;
+        let (decoded, failed, findings) = {
+            let mut image = slot.image.lock().unwrap_or_else(PoisonError::into_inner);
+            if matches!(image.0, State::Waiting) {
+                *image = self.decode(texture);
+            }
+            match &*image {
+                (State::Decoded(decoded), findings) => (Some(Arc::clone(decoded)), None, *findings),
+                (State::Failed(what), findings) => (None, Some(what.clone()), *findings),
+                (State::Waiting, findings) => (None, None, *findings),
+            }
+        };
+        let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
+        found.insert(texture, (failed, findings));
+        drop(found);
+        if !self.announced.is_taken[texture as usize].swap(true, Ordering::Relaxed) {
+            self.announced.images.leave(key, slot);
         }
-        let State::Decoded(decoded) = &slot.state else { return None };
-        let decoded = Arc::clone(decoded);
-        if slot.takers == 0 {
-            slot.state = State::Waiting;
-        }
-        Some(decoded)
+        decoded
     }
 
     fn decode(&self, texture: u32) -> (State, Findings) {
@@ -136,25 +228,32 @@ impl<'a> TextureCache<'a> {
     /// One warning for each image that could not be decoded or is cut short, and for each of an OBJ
     /// whose alpha channel no material uses, in the model's order.
     pub fn warnings(&self) -> Warnings {
+        self.warnings_of(|_| &self.model.source)
+    }
+
+    /// The same where each texture has a model of its own.
+    pub fn warnings_of<'b>(&self, source_of: impl Fn(usize) -> &'b Path) -> Warnings {
         let mut warnings = Warnings::default();
-        for (slot, source) in self.slots.iter().zip(&self.model.textures) {
-            let slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
-            if let State::Failed(what) = &slot.state {
+        let found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
+        for (&texture, (failed, findings)) in &*found {
+            let source = &self.model.textures[texture as usize];
+            let model = source_of(texture as usize);
+            if let Some(what) = failed {
                 warnings.add(format!("{what}; drawn without texture"), 1);
             }
-            if slot.findings.is_cut_short {
+            if findings.is_cut_short {
                 let what = format!(
                     "{}: texture {} is a JPEG without its end; what is missing of it is grey",
-                    self.model.source.display(),
+                    model.display(),
                     source.name
                 );
                 warnings.add(what, 1);
             }
-            if slot.findings.has_unused_alpha && is_obj(self.model) {
+            if findings.has_unused_alpha && is_obj(model) {
                 let what = format!(
                     "{}: texture {} has transparency that its material does not use, drawn opaque; \
                      a map_d of the same file uses it",
-                    self.model.source.display(),
+                    model.display(),
                     source.name
                 );
                 warnings.add(what, 1);

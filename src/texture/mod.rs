@@ -41,9 +41,9 @@ mod wrapped_page;
 
 pub use bake::{BakeClasses, BakePlan, BakeReason, BakedMesh};
 pub use block::{BlockTextures, TextureOptions, texture_factors};
-pub use cache::TextureCache;
+pub use cache::{Announced, DecodedImages, TextureCache};
 #[cfg(feature = "render")]
 pub(crate) use face_picture::{FacePicture, Patch, face_picture};
 pub use node::{AppendedSkirts, TexturedNode};
-pub use plan::{TexturePlan, TextureUse};
+pub use plan::{TexturePlan, TextureUsage, TextureUse};
 pub use shared::{SharedFile, SharedTextures};

@@ -26,9 +26,18 @@ pub struct TexturePlan {
     alpha: Vec<bool>,
 }
 
-impl TexturePlan {
-    /// Decides from the model's triangles and materials, without looking at any image.
-    pub fn new(model: &Model) -> Self {
+/// How the triangles of models use their textures; sums up over models.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TextureUsage {
+    /// Of each texture, the area of its triangles in texture space, in tiles.
+    areas: Vec<f64>,
+    /// Of each texture, what single triangles say of it.
+    uses: Vec<TextureUse>,
+}
+
+impl TextureUsage {
+    /// Of a model's triangles, without looking at any image.
+    pub fn of(model: &Model) -> Self {
         let mut areas = vec![0.0; model.textures.len()];
         let mut uses = vec![TextureUse::Unused; model.textures.len()];
         for part in &model.parts {
@@ -53,6 +62,37 @@ impl TexturePlan {
                 uses[texture] = TextureUse::Atlas;
             }
         }
+        Self { areas, uses }
+    }
+
+    /// Adds that of another model, whose textures have these numbers here.
+    pub fn add(&mut self, other: &Self, numbers: &[u32]) {
+        let most = numbers.iter().map(|&number| number as usize + 1).max().unwrap_or(0);
+        if most > self.uses.len() {
+            self.areas.resize(most, 0.0);
+            self.uses.resize(most, TextureUse::Unused);
+        }
+        for ((&number, area), used) in numbers.iter().zip(&other.areas).zip(&other.uses) {
+            let number = number as usize;
+            self.areas[number] += area;
+            self.uses[number] = match (self.uses[number], *used) {
+                (TextureUse::Repeating, _) | (_, TextureUse::Repeating) => TextureUse::Repeating,
+                (TextureUse::Atlas, _) | (_, TextureUse::Atlas) => TextureUse::Atlas,
+                _ => TextureUse::Unused,
+            };
+        }
+    }
+}
+
+impl TexturePlan {
+    /// Decides from the model's triangles and materials, without looking at any image.
+    pub fn new(model: &Model) -> Self {
+        Self::of_usage(model, TextureUsage::of(model))
+    }
+
+    /// Decides from how triangles use the textures of the model, which need not have them.
+    pub fn of_usage(model: &Model, usage: TextureUsage) -> Self {
+        let TextureUsage { areas, mut uses } = usage;
         for (texture, area) in uses.iter_mut().zip(areas) {
             if *texture == TextureUse::Atlas && area > MAX_REUSE {
                 *texture = TextureUse::Repeating;

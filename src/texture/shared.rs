@@ -41,19 +41,12 @@ struct Slot {
 #[derive(Debug, Default)]
 pub struct SharedTextures {
     slots: Mutex<BTreeMap<Arc<str>, Arc<Slot>>>,
-    /// Texels of each image at full resolution, by content.
-    sources: Mutex<BTreeMap<[u8; 32], u64>>,
 }
 
 impl SharedTextures {
     /// An empty store.
     pub fn new() -> Self {
         Self::default()
-    }
-
-    /// The texels of all images at full resolution, each once: what the source uses of them.
-    pub fn source_texels(&self) -> u64 {
-        self.sources.lock().unwrap_or_else(PoisonError::into_inner).values().sum()
     }
 
     /// The textures that nodes refer to as files, sorted by name.
@@ -124,9 +117,6 @@ impl SharedTextures {
             Arc::clone(slots.entry(Arc::clone(&name)).or_default())
         };
         let made = slot.made.get_or_init(|| {
-            let mut sources = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
-            sources.insert(*decoded.hash().as_bytes(), image.texels());
-            drop(sources);
             let size = [width as usize, height as usize];
             let channels = usize::from(image.channels);
             let encoded = if [width, height] == [image.width, image.height] {
@@ -248,7 +238,6 @@ mod tests {
         let half = store.image("a/Wall.jpg", &source, 2.8, 90).expect("encodes");
         assert_eq!(first, again);
         assert_eq!((half.width, half.height), (32, 16));
-        assert_eq!(store.source_texels(), 64 * 32);
         store.embed(&mut node(&[&first, &half]), 0);
         let files = store.into_files();
         assert_eq!(files.len(), 2);

@@ -278,7 +278,9 @@ fn nodes(
     let plan = TexturePlan::new(&scene.model);
     let shared = SharedTextures::new();
     let materials = 0..scene.model.materials.len() as u32;
-    let cache = TextureCache::new(&scene.model, &plan, [materials]);
+    let images = DecodedImages::default();
+    let announced = images.announce(&scene.model, &plan, materials);
+    let cache = TextureCache::new(&scene.model, &plan, &announced);
     let block = BlockTextures::prepare(&cache, &shared, &scene.mesh, factors, options);
     let nodes = (0..factors.len())
         .map(|level| {
@@ -531,7 +533,9 @@ fn absurd_coordinates_and_missing_images_do_no_harm() {
     scene.model.textures[1].data = TextureData::Embedded(b"not an image".as_slice().into());
     let plan = TexturePlan::new(&scene.model);
     let shared = SharedTextures::new();
-    let cache = TextureCache::new(&scene.model, &plan, [[0u32, 1]]);
+    let images = DecodedImages::default();
+    let announced = images.announce(&scene.model, &plan, [0, 1]);
+    let cache = TextureCache::new(&scene.model, &plan, &announced);
     let block = BlockTextures::prepare(&cache, &shared, &scene.mesh, &[9.0, 1.0], FINEST);
     for level in 0..2 {
         let node = block

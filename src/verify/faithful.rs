@@ -40,8 +40,11 @@ fn rounding_of_cuts(scene: &Scene, node: u32, step: f64) -> f64 {
         leaf if leaf.first_child.is_none() => leaf.level,
         _ => scene.level_count().saturating_sub(1) as u32,
     };
-    step * (0.5 * f64::from(level * cuts_each) + LAST_BITS) * 3f64.sqrt()
+    step * (0.5 * f64::from(BETWEEN_BLOCKS + level * cuts_each) + LAST_BITS) * 3f64.sqrt()
 }
+
+/// Cuts between blocks that a vertex may be made by.
+const BETWEEN_BLOCKS: u32 = 2;
 
 /// Room for the last bits of f64 in coordinates, as a share of a step.
 const LAST_BITS: f64 = 1e-3;

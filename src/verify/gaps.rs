@@ -53,7 +53,7 @@ struct SeamCheck<'a> {
     /// Where the source ends, and the leaf that has each edge.
     open: &'a [([DVec3; 2], u32)],
     lines: Lines,
-    /// Whether there are several inputs, of which districts join vertices that are nearly one.
+    /// Whether there are several inputs, of which nodes above blocks join vertices that are nearly one.
     several: bool,
     steps: &'a [f64],
     limits: &'a Limits,
@@ -204,8 +204,8 @@ impl SeamCheck<'_> {
                 let level = |node: u32| scene.nodes[node as usize].level;
                 let error = |node: u32| scene.nodes[node as usize].geometric_error;
                 let rounding = limits.gap_steps * steps[a as usize].max(steps[b as usize]);
-                let is_district = |node: u32| scene.nodes[node as usize].block.is_none();
-                let joined = self.several && (is_district(a) || is_district(b));
+                let is_above_blocks = |node: u32| scene.nodes[node as usize].block.is_none();
+                let joined = self.several && (is_above_blocks(a) || is_above_blocks(b));
                 let allowed = rounding + seam.apart() + if joined { NEAR } else { 0.0 };
                 let same_level = level(a) == level(b);
                 let error = error(a).max(error(b));

@@ -95,8 +95,8 @@ impl Default for Limits {
     fn default() -> Self {
         Self {
             attribute: 1e-9,
-            median_error_ratio: 1.3,
-            high_error_ratio: 2.0,
+            median_error_ratio: 1.5,
+            high_error_ratio: 2.5,
             texel_ratio: 1.5,
             texel_slack: 1.0,
             leaf_texel_ratio: 3.0,

@@ -22,24 +22,27 @@ pub fn hlod_bench() -> Command {
 
 /// Two blocks with pictures of their own; read only.
 pub fn city() -> &'static Path {
-    static DIR: LazyLock<PathBuf> =
-        LazyLock::new(|| built("city", 60, |folder| write_city(folder, &small_city())));
+    static DIR: LazyLock<PathBuf> = LazyLock::new(|| {
+        let mut options = BuildOptions { districts: false, ..build_options(66) };
+        options.hierarchy.constants.blocks.divided = 55;
+        built("city", &options, |folder| write_city(folder, &small_city()))
+    });
     &DIR
 }
 
 /// A street whose repeating pictures are shared by its nodes; read only.
 pub fn street() -> &'static Path {
     static DIR: LazyLock<PathBuf> =
-        LazyLock::new(|| built("street", 60, |folder| write_street(folder, 24)));
+        LazyLock::new(|| built("street", &build_options(60), |folder| write_street(folder, 24)));
     &DIR
 }
 
-fn built(name: &str, desired_tris: u32, input: impl Fn(&Path) -> PathBuf) -> PathBuf {
+fn built(name: &str, options: &BuildOptions, input: impl Fn(&Path) -> PathBuf) -> PathBuf {
     let folder = tempfile::tempdir().unwrap();
     let input = input(folder.path());
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("bench-{name}"));
     let _ = fs::remove_dir_all(&out);
-    build_with(&[input], &out, &build_options(desired_tris));
+    build_with(&[input], &out, options);
     out
 }
 

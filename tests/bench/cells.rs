@@ -7,6 +7,8 @@ use std::path::Path;
 use assert_cmd::Command;
 use glam::DVec3;
 use hlod::bench::{ReferenceRenderer, Session};
+use hlod::builder::BuildOptions;
+use hlod::builder::partition::BlockSplit;
 use hlod::camera::{
     CameraPath, Ground, PathFrame, PathKind, Pose, from_angles, make_path, write_path,
 };
@@ -221,7 +223,9 @@ fn no_background_shows_through_a_closed_city_but_for_slits_of_a_pixel() {
     };
     let folder = tempfile::tempdir().unwrap();
     let built = folder.path().join("out");
-    build_with(&[write_city(folder.path(), &options)], &built, &build_options(250));
+    let blocks = BlockSplit::Grid(54.0);
+    let build = BuildOptions { blocks, districts: false, ..build_options(250) };
+    build_with(&[write_city(folder.path(), &options)], &built, &build);
     let place = Place::new(&built);
     let ground = Ground::read(&place.scene(), &place.out()).unwrap();
     let walk = make_path(&ground, PathKind::Walk, 300, 30.0, 0).unwrap();

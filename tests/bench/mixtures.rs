@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 use hlod::bench::{Accuracy, FrameInspector, FrameSample, Reference, Session, SilhouetteTolerance};
 use hlod::builder::BuildOptions;
-use hlod::builder::blocks::plan::BlockMode;
+use hlod::builder::partition::BlockSplit;
 use hlod::camera::{Ground, PathKind, Pose, View, from_angles, make_path};
 use hlod::city::{CityOptions, TextureSize};
 use hlod::engine::FarShown;
@@ -158,18 +158,20 @@ fn inspect(reference: &mut Reference, pose: &Pose, front: &[u32]) -> Accuracy {
 fn closed_cities_show_no_background_through_any_mixture_of_levels() {
     let folder = tempfile::tempdir().unwrap();
     // Blocks of four levels.
-    let session = closed_city(folder.path(), &build_options(250));
+    let blocks = BlockSplit::Grid(60.0);
+    let options = BuildOptions { blocks, districts: false, ..build_options(250) };
+    let session = closed_city(folder.path(), &options);
     no_background_shows_through(&session, folder.path(), 0.0, |_, _| true);
 }
 
-/// Of squares that planes cut out of the city, and two levels of districts above them.
+/// Of squares that planes cut out of the city, and two levels of nodes above them.
 #[test]
-fn districts_show_no_background_beside_each_other_or_beside_any_level_below_them() {
+fn nodes_above_blocks_show_no_background_beside_each_other_or_beside_any_level_below_them() {
     let folder = tempfile::tempdir().unwrap();
-    let blocks = BlockMode::Grid(10.0);
+    let blocks = BlockSplit::Grid(10.0);
     let options = BuildOptions { blocks, districts: true, ..build_options(250) };
     let session = closed_city(folder.path(), &options);
-    assert!(session.scene().blocks.len() > 60, "{} blocks", session.scene().blocks.len());
+    assert!(session.scene().blocks.len() > 40, "{} blocks", session.scene().blocks.len());
     let tops = session.tree().roots().len();
     assert!(tops < 8 && session.scene().level_count() >= 4, "{tops}");
     // A district is off by metres, which from a street is as far as to the other side of it.

@@ -156,7 +156,7 @@ pub fn block(mesh: Mesh<f64>) -> (Chunk, Lattice) {
     let lattice = Lattice::for_extent(extent, extent);
     let border = Border::interior(mesh.positions.len());
     let chunk = Chunk { mesh, border, ..Chunk::default() };
-    (hlod::builder::blocks::gather::localise(chunk, [0.0; 3], lattice, false).0, lattice)
+    (hlod::builder::gather::localise(chunk, [0.0; 3], lattice, false).0, lattice)
 }
 
 /// A node as the sink saw it.

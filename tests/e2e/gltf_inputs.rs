@@ -72,22 +72,22 @@ fn copyright_notices_are_joined_in_every_node_and_the_tileset() {
     square(&inputs, "a.gltf", 0.0, Some("© A & <Sons>"));
     square(&inputs, "b.gltf", 5.0, None);
     square(&inputs, "c.gltf", 10.0, Some("CC BY © C; © A & <Sons>"));
-    run_build(at, &["in", "out"]);
+    run_build(at, &["--blocks", "grid:4", "in", "out"]);
     assert_eq!(notice(&at.join("out")).unwrap(), "© A & <Sons>; CC BY © C");
     let tileset = fs::read_to_string(at.join("out").join(TILESET_FILE)).unwrap();
     assert!(tileset.contains(r#""html":"© A &amp; &lt;Sons&gt;""#), "{tileset}");
-    assert!(run_build(at, &["in", "out"]).contains("up to date"));
+    assert!(run_build(at, &["--blocks", "grid:4", "in", "out"]).contains("up to date"));
 
     // Shares of a build know the notices of all inputs.
     for share in ["1/3", "2/3", "3/3"] {
-        run_build(at, &["--subset", share, "in", "merged"]);
+        run_build(at, &["--blocks", "grid:4", "--subset", share, "in", "merged"]);
     }
     run_build(at, &["merge", "merged"]);
     assert_eq!(difference(&lasting(&at.join("out")), &lasting(&at.join("merged"))), None);
 
     // A notice that changes is one in every node.
     square(&inputs, "b.gltf", 5.0, Some("© B"));
-    run_build(at, &["--copyright", "© City", "in", "out"]);
+    run_build(at, &["--blocks", "grid:4", "--copyright", "© City", "in", "out"]);
     assert_eq!(notice(&at.join("out")).unwrap(), "© A & <Sons>; © B; CC BY © C; © City");
 
     write(at, "plain.obj", SQUARE);

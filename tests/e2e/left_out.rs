@@ -88,12 +88,14 @@ fn what_loses_much_of_the_ground_or_the_skyline_is_not_written() {
         assert!(kept > 0.89, "{name}: {kept}");
 
         let out = folder.path().join("out");
-        let left_out = report(&out)["inputs"][0]["left_out"].clone();
-        let left_out = left_out.as_array().unwrap();
+        let left_out = report(&out)["blocks"].clone();
+        let blocks = left_out.as_array().unwrap().iter();
+        let left_out: Vec<_> =
+            blocks.flat_map(|block| block["left_out"].as_array().unwrap()).collect();
         assert!(!left_out.is_empty(), "{name}");
         let scene = Built::read(&out).scene;
         let whole = Built::read(&folder.path().join("all")).scene;
-        for node in left_out {
+        for node in &left_out {
             let file = node["file"].as_str().unwrap();
             assert!(!out.join("nodes").join(file).exists(), "{file}");
             assert!(whole.nodes.iter().any(|node| node.file == file), "{file}");
@@ -131,24 +133,25 @@ fn a_node_that_keeps_enough_with_more_triangles_has_them() {
 fn an_input_with_nodes_left_out_is_taken_over_whole() {
     let folder = tempfile::tempdir().unwrap();
     slabs(folder.path());
-    write(folder.path(), "one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write(folder.path(), "one.obj", "v 5000 0 0\nv 5001 0 0\nv 5000 1 0\nf 1 2 3\n");
     let build = |arguments: &[&str]| {
-        run_build(folder.path(), &[&["--desired-tris", "300", "slabs.obj"], arguments].concat())
+        let options = ["--desired-tris", "300", "--blocks", "grid:2000", "slabs.obj"];
+        run_build(folder.path(), &[&options[..], arguments].concat())
     };
     let text = build(&["one.obj", "out"]);
     assert!(text.contains("left out"), "{text}");
     build(&["one.obj", "clean"]);
-    write(folder.path(), "one.obj", "v 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\n");
+    write(folder.path(), "one.obj", "v 5000 0 0\nv 5002 0 0\nv 5000 1 0\nf 1 2 3\n");
     let before = report(&folder.path().join("out"))["inputs"].clone();
     build(&["one.obj", "out"]);
     let after = report(&folder.path().join("out"))["inputs"].clone();
     assert_ne!(before, after, "the other input has changed");
-    write(folder.path(), "one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write(folder.path(), "one.obj", "v 5000 0 0\nv 5001 0 0\nv 5000 1 0\nf 1 2 3\n");
     build(&["one.obj", "out"]);
     let left_out = |out: &str| {
-        let inputs = report(&folder.path().join(out))["inputs"].clone();
-        let slabs = |input: &&serde_json::Value| input["path"] == "slabs.obj";
-        inputs.as_array().unwrap().iter().find(slabs).unwrap()["left_out"].clone()
+        let blocks = report(&folder.path().join(out))["blocks"].clone();
+        let slabs = |block: &&serde_json::Value| block["name"].to_string().contains("slabs");
+        blocks.as_array().unwrap().iter().find(slabs).unwrap()["left_out"].clone()
     };
     assert!(!left_out("out").as_array().unwrap().is_empty());
     assert_eq!(left_out("out"), left_out("clean"));

@@ -215,7 +215,7 @@ fn the_files_are_those_of_the_scene_and_no_others() {
     for case in cases() {
         let scene = &case.built.scene;
         let mut expected: BTreeSet<String> =
-            ["scene.hlod", "build.json", "tileset.json"].map(String::from).into();
+            ["scene.hlod", "scans.hlod", "build.json", "tileset.json"].map(String::from).into();
         expected.extend(scene.nodes.iter().map(|node| format!("nodes/{}", node.file)));
         expected.extend(
             scene
@@ -224,6 +224,8 @@ fn the_files_are_those_of_the_scene_and_no_others() {
                 .map(|texture| format!("{TEXTURES_DIR}/{}", texture.file_name)),
         );
         let found = contents(&case.out());
+        let report: BuildReport = serde_json::from_slice(&found["build.json"]).unwrap();
+        expected.extend(report.blocks.iter().map(|block| format!("borders/{}.border", block.name)));
         assert_eq!(found.keys().cloned().collect::<BTreeSet<_>>(), expected, "{}", case.name);
         for texture in &scene.shared_textures {
             let bytes = &found[&format!("{TEXTURES_DIR}/{}", texture.file_name)];
@@ -505,16 +507,16 @@ fn check_tiles(jpeg_quality: u8, is_right: impl Fn([u8; 3], usize, u32) -> bool)
                 NodeImageData::Shared { .. } => panic!("a façade's texture repeats nothing"),
             })
             .collect();
-        let name = &built.scene.blocks[node.block.unwrap() as usize].name;
-        let block = (0..city.len()).find(|&block| city.block_name(block) == *name).unwrap();
-        let (source, source_uvs) = &blocks[block];
         let corners: Vec<Triangle> = triangles.iter().map(|triangle| triangle.corners).collect();
         let points = [3_000, 800, 400][(node.level as usize).min(2)];
         for (number, point) in sample(&corners, points, &mut random) {
             let triangle = &triangles[number];
             let (_, weights, _) = nearest_of(point, &corners[number..=number]);
             let shown = texel(&images[triangle.image], blend(triangle.texcoords, weights));
-            let (nearest, weights, distance) = nearest_of(point, source);
+            let all = blocks.iter().map(|(source, _)| nearest_of(point, source)).enumerate();
+            let nearest = all.min_by(|a, b| a.1.2.total_cmp(&b.1.2)).unwrap();
+            let (block, (nearest, weights, distance)) = nearest;
+            let source_uvs = &blocks[block].1;
             let Some(expected) = city.tile_at(block, blend(source_uvs[nearest], weights)) else {
                 continue;
             };

@@ -6,8 +6,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 use glam::DVec3;
-use hlod::builder::blocks::plan::BlockMode;
 use hlod::builder::hierarchy::{BorderMode, HierarchyOptions};
+use hlod::builder::partition::BlockSplit;
 use hlod::builder::progress::Silent;
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::builder::{BuildOptions, build};
@@ -143,11 +143,11 @@ fn random_options(random: &mut Random) -> BuildOptions {
             ..HierarchyOptions::default()
         },
         blocks: random.pick(&[
-            BlockMode::Auto,
-            BlockMode::Auto,
-            BlockMode::Groups,
-            BlockMode::Grid(25.0),
-            BlockMode::Grid(1000.0),
+            BlockSplit::Auto,
+            BlockSplit::Auto,
+            BlockSplit::Auto,
+            BlockSplit::Grid(25.0),
+            BlockSplit::Grid(1000.0),
         ]),
         max_atlas: random.pick(&[16, 64, 4096]),
         jpeg_quality: random.pick(&[1, 85, 100]),

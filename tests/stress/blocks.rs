@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 use hlod::builder::BuildOptions;
-use hlod::builder::blocks::plan::BlockMode;
 use hlod::builder::hierarchy::{HierarchyOptions, TreeShape};
 
 use crate::chain::{Chain, options};
@@ -123,7 +122,8 @@ fn trees_of_any_depth() {
         ("level factor 64, 40 triangles", 40, 64),
     ] {
         // One block, so that its root has the budget.
-        let mut options = BuildOptions { blocks: BlockMode::Groups, ..tree(desired, factor) };
+        let mut options = tree(desired, factor);
+        options.hierarchy.constants.blocks.divided = 1 << 20;
         // Ten triangles are too few to keep the skyline of these hills: such a root is left out.
         options.hierarchy.constants.outline.least_kept = 0.0;
         let found = chain(&Shape::hills(), &options);

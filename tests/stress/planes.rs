@@ -1,7 +1,7 @@
 //! Vertices on the planes that cut, next to them, and edges within them.
 
 use hlod::builder::BuildOptions;
-use hlod::builder::blocks::plan::BlockMode;
+use hlod::builder::partition::BlockSplit;
 
 use crate::chain::{Chain, options};
 use crate::shape::Shape;
@@ -81,7 +81,9 @@ fn check(table: &mut Table, name: &str, options: &BuildOptions, same_blocks: boo
 fn vertices_on_planes_are_as_good_as_others() {
     let mut table = Table::new("5-planes", "Vertices on cutting planes and beside them");
     check(&mut table, "", &options(), true);
-    let grid = BuildOptions { blocks: BlockMode::Grid(16.0), ..options() };
+    // How many nodes stand above squares follows from how many triangles these have.
+    let blocks = BlockSplit::Grid(16.0);
+    let grid = BuildOptions { blocks, districts: false, ..options() };
     check(&mut table, ", blocks of 16 m", &grid, false);
     table.finish();
 }

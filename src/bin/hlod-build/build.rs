@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use clap::{Args, ValueEnum};
-use hlod::builder::blocks::plan::BlockMode;
 use hlod::builder::hierarchy::{BorderMode, HierarchyOptions, TreeShape};
+use hlod::builder::partition::BlockSplit;
 use hlod::builder::progress::Progress;
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::builder::threads::with_threads;
@@ -25,13 +25,12 @@ pub struct BuildArgs {
     #[arg(value_name = "INPUT... OUT", required = true, num_args = 2..)]
     paths: Vec<PathBuf>,
 
-    /// How inputs become blocks: `auto` (groups where they make sense; merged where tiny or one
-    /// surface; divided where huge, or where they have more buildings than a root can show),
-    /// `groups`, or `grid:METRES`
+    /// How the city is divided into blocks, whatever its files and groups are: `auto` (cells of at most 128
+    /// times --desired-tris triangles), or `grid:METRES` (squares of METRES on the ground)
     #[arg(long, value_name = "MODE", default_value = "auto", help_heading = "Hierarchy")]
-    blocks: BlockMode,
+    blocks: BlockSplit,
     /// Nodes above the blocks, so that a view of a whole city costs the same however many blocks it
-    /// has: `on`, or `off`, where the roots of all blocks are drawn at least
+    /// has: `on`, or `off`, with which such a view draws at least the roots of all blocks
     #[arg(long, value_enum, default_value_t = SwitchArg::On, help_heading = "Hierarchy")]
     districts: SwitchArg,
     /// The shape of the trees
@@ -108,17 +107,17 @@ pub struct BuildArgs {
     #[arg(long, value_enum, default_value_t = SwitchArg::On, help_heading = "Files")]
     normals: SwitchArg,
 
-    /// Build the Kth of N shares of the inputs, into OUT/subsets/K-of-N: N machines that see the same
+    /// Build the Kth of N shares of the blocks, into OUT/subsets/K-of-N: N machines that see the same
     /// files build one each, and `hlod-build merge OUT` joins them. Inputs, as they are written here, and
-    /// options must be the same for all
+    /// options must be the same for all; N is at most the number of blocks
     #[arg(long, value_name = "K/N", help_heading = "Running")]
     subset: Option<Subset>,
     /// Threads, 0-1024; 0 is one for each core. The result does not depend on it
     #[arg(long, short = 'j', value_name = "N", default_value_t = 0, help_heading = "Running")]
     threads: usize,
-    /// Keep to so many bytes of memory, 128MiB or more: OBJ files of more than 16 MiB are divided into tiles on
-    /// disk, beside the output and half as large again as the files while it lasts, and built one tile at a
-    /// time. The result is the same for any number, and nearly that without
+    /// Keep to this many bytes of memory, 128MiB or more: OBJ files of more than 16 MiB are divided into tiles on
+    /// disk, which are read one at a time. During the build the tiles take up to 1.5 times the size of the files,
+    /// beside the output. The result is the same for any number, and nearly that without
     #[arg(long, value_name = "BYTES", help_heading = "Running")]
     max_memory: Option<Bytes>,
     /// Go on from what a build with --resume that was stopped had finished, and leave what is finished beside
@@ -335,11 +334,6 @@ impl Progress for Bar {
     fn dividing(&self, input: &Path) {
         let name = input.file_name().unwrap_or_default().to_string_lossy();
         self.bar.set_message(format!("{name}: dividing"));
-    }
-
-    fn comparing(&self, input: &Path) {
-        let name = input.file_name().unwrap_or_default().to_string_lossy();
-        self.bar.set_message(format!("{name}: where it meets others"));
     }
 
     fn found(&self, triangles: u64) {

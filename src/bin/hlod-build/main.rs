@@ -19,9 +19,10 @@ use verify::VerifyArgs;
 
 /// Turns city meshes into a hierarchy of levels of detail.
 ///
-/// Reads OBJ, glTF and GLB files, or folders of them; divides them into blocks; and writes for
-/// every block a tree of nodes, coarse at the root, the original triangles at the leaves. Writes
-/// OUT/scene.hlod (index), OUT/nodes/*.glb, OUT/tileset.json (3D Tiles) and OUT/build.json (report).
+/// Reads OBJ, glTF and GLB files, or folders of them; divides all of them together into blocks; and
+/// writes for every block a tree of nodes, coarse at the root, the original triangles at the leaves,
+/// and nodes above the blocks. Writes OUT/scene.hlod (index), OUT/nodes/*.glb, OUT/tileset.json
+/// (3D Tiles) and OUT/build.json (report).
 /// An earlier result in OUT stays until the new one is complete. Where inputs and options have not
 /// changed, nothing is done.
 #[derive(Parser, Debug)]
@@ -59,7 +60,7 @@ enum Command {
     /// (`hlod-bench --far-field cells`). Writes OUT/cells.hlod (index) and OUT/cells/*.glb; goes on where an
     /// earlier run was stopped. Needs a graphics adapter, or Mesa's lavapipe (Debian: mesa-vulkan-drivers)
     Cells(CellsArgs),
-    /// Joins what machines built of one city with --subset: the same files as one build of all inputs
+    /// Joins what machines built of one city with --subset: the same files as one build
     Merge(MergeArgs),
 }
 

@@ -126,7 +126,7 @@ fn sections(edges: &[EdgeKey], source: &Side) -> Vec<Vec<u32>> {
     }
     let of_border = |&vertex: &u32| {
         let position = source.mesh.positions[vertex as usize];
-        BorderVertex { position, fixed: false, surface: SurfaceQuadric::default() }
+        BorderVertex { position, fixed: false, surface: SurfaceQuadric::default(), gone: false }
     };
     let all: Vec<BorderVertex> = vertices.iter().map(of_border).collect();
     let mut sections = chains_of(&all, &numbered);

@@ -48,6 +48,8 @@ pub struct BorderVertex<C = f32> {
     pub fixed: bool,
     /// The planes of the triangles around it, on both sides of the cut.
     pub surface: SurfaceQuadric,
+    /// No node that the border is ranked for has it: it is where skirts reach to, and no more.
+    pub gone: bool,
 }
 
 /// How many border vertices each level keeps.
@@ -101,25 +103,41 @@ impl<C: Coordinate> CutPlane<C> {
         rule: &KeepRule,
     ) -> Self {
         let runs = chains_of(vertices, edges);
-        let line = |run: &Vec<u32>| {
-            let all = run.iter().map(|&vertex| &vertices[vertex as usize]);
+        // Of each run, the places of those that are there.
+        let there: Vec<Vec<u32>> = runs
+            .iter()
+            .map(|run| {
+                let last = run.len() - 1;
+                let is_there =
+                    |&at: &usize| at == 0 || at == last || !vertices[run[at] as usize].gone;
+                (0..run.len()).filter(is_there).map(|at| at as u32).collect()
+            })
+            .collect();
+        let line = |(run, there): (&Vec<u32>, &Vec<u32>)| {
+            let all = there.iter().map(|&at| &vertices[run[at as usize] as usize]);
             Polyline {
                 points: all.clone().map(|vertex| wide(vertex.position)).collect(),
                 surfaces: all.map(|vertex| vertex.surface).collect(),
             }
         };
-        let order = removals(&runs.iter().map(line).collect::<Vec<_>>(), &rule.constants);
+        let lines: Vec<Polyline> = runs.iter().zip(&there).map(line).collect();
+        let order = removals(&lines, &rule.constants);
+        let last_level = rule.first_level + rule.shares.len() as u8 - 1;
         let mut chains: Vec<Chain<C>> = runs
             .iter()
-            .map(|run| Chain {
-                positions: run.iter().map(|&vertex| vertices[vertex as usize].position).collect(),
-                keep: vec![rule.first_level; run.len()],
+            .zip(&there)
+            .map(|(run, there)| {
+                let positions = run.iter().map(|&vertex| vertices[vertex as usize].position);
+                let mut keep = vec![last_level; run.len()];
+                there.iter().for_each(|&at| keep[at as usize] = rule.first_level);
+                Chain { positions: positions.collect(), keep }
             })
             .collect();
         let total = order.len();
         for (rank, removal) in order.iter().rev().enumerate() {
             let step = rule.step(rank, total, removal.deviation);
-            chains[removal.line as usize].keep[removal.index as usize] = rule.first_level + step;
+            let at = there[removal.line as usize][removal.index as usize];
+            chains[removal.line as usize].keep[at as usize] = rule.first_level + step;
         }
         Self::from_chains(axis, coordinate, chains)
     }
@@ -244,6 +262,7 @@ mod tests {
                 position,
                 fixed: false,
                 surface: SurfaceQuadric::default(),
+                gone: false,
             })
             .collect()
     }

@@ -3,8 +3,10 @@
 pub mod cap;
 pub mod chain;
 pub(crate) mod cover;
+pub mod face;
+pub mod mark;
 pub mod rank;
-pub mod shared;
+pub mod record;
 pub mod skirt;
 pub mod skirt_rules;
 pub mod slit;

@@ -25,6 +25,16 @@ pub struct SurfaceQuadric {
 }
 
 impl SurfaceQuadric {
+    /// Its coefficients: xx, yy, zz, xy, xz, yz.
+    pub fn terms(&self) -> [f64; 6] {
+        self.terms
+    }
+
+    /// Of these coefficients.
+    pub fn from_terms(terms: [f64; 6]) -> Self {
+        Self { terms }
+    }
+
     /// Adds the plane of a triangle that has the vertex.
     pub fn add_triangle(&mut self, [a, b, c]: [DVec3; 3]) {
         let normal = (b - a).cross(c - a);

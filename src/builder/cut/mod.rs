@@ -1,5 +1,9 @@
 //! Cutting at planes: where, and what becomes of the triangles that cross.
 
+pub mod cell;
+#[cfg(test)]
+mod cell_tests;
 pub mod plane;
+pub mod section;
 pub mod split;
 pub mod uncut;

@@ -419,6 +419,7 @@ fn make_plane<C: Coordinate>(
                 position,
                 fixed: false,
                 surface: SurfaceQuadric::default(),
+                gone: false,
             });
             wedges.push(vertex);
             vertices.len() as u32 - 1

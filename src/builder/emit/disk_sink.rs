@@ -1,5 +1,7 @@
 //! Writes a block's nodes: textures them, encodes them as GLB, and records them for `scene.hlod`.
 
+use std::collections::BTreeMap;
+
 use crate::builder::border::skirt;
 use crate::builder::hierarchy::{NodeDraft, NodeSink};
 use crate::builder::progress::Progress;
@@ -39,7 +41,7 @@ pub struct NodeRecord {
     /// Width and height of each of its own images, in the order of the file.
     pub pictures: Vec<[u32; 2]>,
     /// Names and texels of the shared textures that it uses.
-    pub shared: Vec<(String, u64)>,
+    pub shared: BTreeMap<String, u64>,
     /// Its triangle budget.
     pub budget: usize,
     /// The step that made it; `None` if it was reused from an earlier build.
@@ -48,7 +50,7 @@ pub struct NodeRecord {
     pub baked: Option<BakeReason>,
     /// Why it exceeds its budget, if it does.
     pub reason: Option<String>,
-    /// The number of its block in the scene; `None` of a district, and while blocks have none.
+    /// The number of its block in the scene; `None` of a node above blocks, and while blocks have none.
     pub block: Option<u32>,
     /// Warnings about it.
     pub warnings: Warnings,

@@ -56,7 +56,7 @@ pub fn append_nodes(
 /// A node on its own, as if it were a root without children.
 fn node_of(record: NodeRecord, shared_numbers: &BTreeMap<String, u32>) -> Node {
     let mut shared_textures: Vec<u32> =
-        record.shared.iter().filter_map(|(name, _)| shared_numbers.get(name).copied()).collect();
+        record.shared.keys().filter_map(|name| shared_numbers.get(name).copied()).collect();
     shared_textures.sort_unstable();
     shared_textures.dedup();
     Node {
@@ -78,7 +78,7 @@ fn node_of(record: NodeRecord, shared_numbers: &BTreeMap<String, u32>) -> Node {
         mean_error: record.mean_error,
         p95_error: record.p95_error,
         texels: record.own_texels(),
-        shared_texels: record.shared.iter().map(|(_, texels)| texels).sum(),
+        shared_texels: record.shared.values().sum(),
         origin: record.origin,
         file: record.file,
         file_bytes: record.file_bytes,

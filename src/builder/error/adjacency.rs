@@ -1,5 +1,6 @@
 //! Which triangles share edges, by positions: vertices differ at texture seams.
 
+use glam::Vec3;
 use meshopt::{VertexDataAdapter, generate_position_remap};
 use rustc_hash::FxHashMap;
 
@@ -9,8 +10,16 @@ use crate::mesh::{Mesh, PositionKey, key};
 /// A triangle of one mesh: the number of its leaf times eight, and its lane.
 pub(super) type Slot = u32;
 
-/// In place of a neighbour: the edge belongs to one triangle, or to more than two.
+/// In place of a neighbour: none of the edge's other triangles continues this one.
 const NONE: Slot = u32::MAX;
+
+/// Edges with more triangles than this are left without neighbours: pairing them takes time in
+/// proportion to the square of their number.
+const MOST_PAIRED: usize = 8;
+
+/// Two triangles that face different ways continue each other if no other triangle of the edge
+/// that faces the same way is flatter to one of them, by this difference of cosines.
+const TURNED: f32 = 0.5;
 
 /// The triangles of one mesh with their neighbours.
 #[derive(Debug, Default)]
@@ -37,6 +46,17 @@ impl Linked {
     #[inline(always)]
     pub fn across(&self, edge: usize) -> Option<Slot> {
         (self.across[edge] != NONE).then_some(self.across[edge])
+    }
+
+    /// The way along an edge, and the direction from there to the third corner, across the edge.
+    fn away_from(&self, edge: usize) -> (Vec3, Vec3) {
+        let [x, y, z] = self.corners;
+        let [from, to, apex] = [0, 1, 2].map(|next| {
+            let corner = (edge + next) % 3;
+            Vec3::new(x[corner], y[corner], z[corner])
+        });
+        let along = to - from;
+        (along, (apex - from).reject_from(along).normalize_or_zero())
     }
 }
 
@@ -82,9 +102,11 @@ impl Adjacency {
                         ends.sort_unstable();
                         open.push(OpenEdge { ends, slot, edge });
                     }
-                    [(_, (a, of_a)), (_, (b, of_b))] => {
-                        triangles[a as usize].across[usize::from(of_a)] = b;
-                        triangles[b as usize].across[usize::from(of_b)] = a;
+                    [(_, a), (_, b)] => link(&mut triangles, a, b),
+                    _ if same.len() <= MOST_PAIRED => {
+                        let edges: Vec<(Slot, u8)> = same.iter().map(|&(_, edge)| edge).collect();
+                        let pairs = continuing(&triangles, &edges);
+                        pairs.into_iter().for_each(|[a, b]| link(&mut triangles, a, b));
                     }
                     _ => {}
                 }
@@ -92,6 +114,38 @@ impl Adjacency {
         }
         Self { triangles, open }
     }
+}
+
+fn link(triangles: &mut [Linked], (a, of_a): (Slot, u8), (b, of_b): (Slot, u8)) {
+    triangles[a as usize].across[usize::from(of_a)] = b;
+    triangles[b as usize].across[usize::from(of_b)] = a;
+}
+
+/// Pairs the triangles of an edge that continue each other: flat ones first, of equally flat ones
+/// those that face the same way. Where each face is there twice, both sides are so surfaces of
+/// their own. An overlay is sound with any pairs: no triangle is in two.
+fn continuing(triangles: &[Linked], edges: &[(Slot, u8)]) -> Vec<[(Slot, u8); 2]> {
+    let away: Vec<(Vec3, Vec3)> =
+        edges.iter().map(|&(slot, edge)| triangles[slot as usize].away_from(edge.into())).collect();
+    let mut pairs: Vec<(f32, [usize; 2])> = Vec::new();
+    for b in 0..edges.len() {
+        for a in 0..b {
+            let ((along_a, away_a), (along_b, away_b)) = (away[a], away[b]);
+            // Neighbours that face the same way pass along their edge in opposite directions.
+            let turned = if along_a.dot(along_b) > 0.0 { TURNED } else { 0.0 };
+            pairs.push((away_a.dot(away_b) + turned, [a, b]));
+        }
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
+    let mut is_paired = vec![false; edges.len()];
+    pairs.retain(|(_, [a, b])| {
+        let are_free = !is_paired[*a] && !is_paired[*b];
+        if are_free {
+            (is_paired[*a], is_paired[*b]) = (true, true);
+        }
+        are_free
+    });
+    pairs.into_iter().map(|(_, pair)| pair.map(|number| edges[number])).collect()
 }
 
 /// The slots that are used, each with its triangle.
@@ -172,5 +226,60 @@ impl Links {
     /// The triangle across an edge.
     pub fn across(&self, part: u32, slot: Slot, edge: usize) -> Option<(u32, Slot)> {
         self.0.get(&(part, slot, edge as u8)).copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bvh::Bvh;
+    use super::super::tests::mesh;
+    use super::*;
+
+    /// Of each triangle the one across the edge from vertex 0 to vertex 1.
+    fn across(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<Option<usize>> {
+        let mesh = mesh(positions, triangles);
+        let (_, leaves) = Bvh::new(&mesh);
+        let adjacency = Adjacency::new(&mesh, &leaves);
+        let numbers: FxHashMap<Slot, u32> = slots(&leaves).collect();
+        let mut across = vec![None; triangles.len()];
+        for (&slot, &number) in &numbers {
+            let corners = triangles[number as usize];
+            let edge = (0..3).find(|&edge| ends(corners, edge, &[0, 1, 2, 3, 4, 5, 6]) == (0, 1));
+            let other = adjacency.triangles[slot as usize].across(edge.unwrap());
+            across[number as usize] = other.map(|slot| numbers[&slot] as usize);
+        }
+        across
+    }
+
+    /// An edge, and points left and right of it, above it, and a little above the left.
+    const POINTS: [[f32; 3]; 6] = [
+        [0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [-1.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [-1.0, 0.0, 0.3],
+    ];
+
+    #[test]
+    fn flat_neighbours_continue_each_other() {
+        let beside_a_wall = across(&POINTS, &[[0, 1, 2], [4, 1, 0], [1, 0, 3]]);
+        assert_eq!(beside_a_wall, [Some(2), None, Some(0)]);
+        let turned = across(&POINTS, &[[0, 1, 2], [4, 1, 0], [0, 1, 3]]);
+        assert_eq!(turned, [Some(2), None, Some(0)]);
+        let flatter = across(&POINTS, &[[0, 1, 5], [0, 1, 2], [1, 0, 3]]);
+        assert_eq!(flatter, [None, Some(2), Some(1)]);
+    }
+
+    #[test]
+    fn both_sides_of_a_sheet_are_surfaces_of_their_own() {
+        let sides = across(&POINTS, &[[0, 1, 2], [1, 0, 2], [0, 1, 3], [1, 0, 3]]);
+        assert_eq!(sides, [Some(3), Some(2), Some(1), Some(0)]);
+    }
+
+    #[test]
+    fn a_crowded_edge_has_no_neighbours() {
+        let many: Vec<[u32; 3]> = (0..9).map(|n| [0, 1, 2 + n % 4]).collect();
+        assert_eq!(across(&POINTS, &many), [None; 9]);
     }
 }

@@ -130,6 +130,12 @@ impl Box3 {
         self.low.x > self.high.x
     }
 
+    /// Whether it is within `reach` of another box along each axis.
+    pub fn is_within(&self, reach: f32, other: Self) -> bool {
+        let apart = (self.low - other.high).max(other.low - self.high);
+        apart.max_element() <= reach
+    }
+
     pub fn centre(&self) -> Vec3 {
         (self.low + self.high) * 0.5
     }

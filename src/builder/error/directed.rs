@@ -11,8 +11,8 @@
 //! is settled, and what is left around, so that equal surfaces with other triangles take about as
 //! many polygons as their triangles overlap in.
 //!
-//! Where parts of the other surface stand for others that they may be off, how far they may be
-//! counts with the distance to them.
+//! Where parts of the surfaces are off the source themselves, a bound of how far is added to the
+//! distance from them and to them, place by place: the triangle inequality.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -34,8 +34,8 @@ pub const TIGHTNESS: f32 = 1.1;
 pub(super) struct Largest {
     /// Found at a point.
     pub found: f32,
-    /// The part of the other surface that is nearest there.
-    pub near: u32,
+    /// Smaller distances are not told apart.
+    least: f32,
     /// No part that is settled is farther.
     pub settled: f32,
     /// Whether the budget was too small.
@@ -47,7 +47,8 @@ pub(super) struct Largest {
 impl Largest {
     /// Nothing less than `least` is told apart.
     pub fn at_least(least: f32) -> Self {
-        Self { found: least, near: 0, settled: 0.0, exhausted: false, divisions: 0 }
+        let found = least / TIGHTNESS;
+        Self { found, least, settled: 0.0, exhausted: false, divisions: 0 }
     }
 
     /// No point of either surface is farther.
@@ -56,13 +57,11 @@ impl Largest {
     }
 
     fn limit(&self) -> f32 {
-        self.found * TIGHTNESS
+        self.least.max(self.found * TIGHTNESS)
     }
 
-    fn find(&mut self, distance: f32, near: TriangleId) {
-        if distance > self.found {
-            (self.found, self.near) = (distance, near.part);
-        }
+    fn find(&mut self, distance: f32) {
+        self.found = self.found.max(distance);
     }
 
     /// Whether what is not farther than this needs no division.
@@ -77,6 +76,8 @@ impl Largest {
 
 /// Part of a triangle.
 struct Part {
+    /// The number of the mesh that the triangle is of.
+    of: u32,
     corners: Polygon,
     /// No point of it is farther.
     bound: f32,
@@ -85,8 +86,8 @@ struct Part {
 }
 
 impl Part {
-    fn new(corners: Polygon, bound: f32) -> Self {
-        Self { corners, bound, near: None }
+    fn new(of: u32, corners: Polygon, bound: f32) -> Self {
+        Self { of, corners, bound, near: None }
     }
 }
 
@@ -97,8 +98,6 @@ pub(super) struct Directed<'a> {
     marks: Option<Marks>,
     /// By how much computed distances may be wrong.
     rounding: f32,
-    /// The most that a part of the other surface may be off.
-    most_off: f32,
     search: Search<'a>,
     overlay: Overlay<'a>,
     largest: Largest,
@@ -118,14 +117,14 @@ struct Open {
 /// Measures some points, spread evenly.
 pub(super) fn seed(from: &Original, to: &Original, largest: &mut Largest) {
     let mut search = Search::new(to);
-    let most_off = to.most_off();
     let leaves: usize = from.parts.iter().map(|part| part.bvh.leaves.len()).sum();
-    let leaves_of = |part: usize| from.parts[part].bvh.leaves.iter();
-    let all = (0..from.parts.len()).flat_map(leaves_of);
-    for leaf in all.step_by(leaves.div_ceil(from.constants.seeds)) {
+    let all = (0..).zip(&from.parts);
+    let all = all.flat_map(|(of, part)| part.bvh.leaves.iter().map(move |leaf| (of, leaf)));
+    for (part, leaf) in all.step_by(leaves.div_ceil(from.constants.seeds)) {
+        let off = from.off(part);
         for point in leaf.lane(0).corners() {
-            let near = search.nearest(point, (largest.found - most_off).max(0.0));
-            largest.find(near.squared.sqrt() + to.off(near.id.part), near.id);
+            let near = search.nearest(point, largest.found - off);
+            largest.find(near.squared.sqrt() + off + to.off(near.id.part));
         }
     }
 }
@@ -136,8 +135,7 @@ impl<'a> Directed<'a> {
         let constants = from.constants;
         let budget = constants.divisions.max(constants.divisions_per_triangle * triangles);
         let (search, overlay) = (Search::new(to), Overlay::new(to));
-        let most_off = to.most_off();
-        Self { from, marks: None, rounding, most_off, search, overlay, largest, budget, constants }
+        Self { from, marks: None, rounding, search, overlay, largest, budget, constants }
     }
 
     /// With what the way back has told. The surface it goes to must be of one mesh.
@@ -162,30 +160,30 @@ impl<'a> Directed<'a> {
         (self.largest, self.overlay.into_marks())
     }
 
-    /// Measures a point of the surface, to no less than `enough` or the largest so far.
-    fn measure(&mut self, point: Vec3, enough: f32) -> (f32, TriangleId) {
-        let near = self.nearest(point, enough.min(self.largest.found));
-        self.largest.find(near.0, near.1);
+    /// Measures a point of a mesh of the surface, to no less than `enough` or the largest so far.
+    fn measure(&mut self, of: u32, point: Vec3, enough: f32) -> (f32, TriangleId) {
+        let near = self.nearest(of, point, enough.min(self.largest.found));
+        self.largest.find(near.0);
         near
     }
 
-    /// The distance to the nearest triangle and what its part may be off, or one that is not above
-    /// `enough`.
-    fn nearest(&mut self, point: Vec3, enough: f32) -> (f32, TriangleId) {
-        let near = self.search.nearest(point, (enough - self.most_off).max(0.0));
-        (near.squared.sqrt() + self.off(near.id), near.id)
+    /// The distance to the nearest triangle and how far both meshes may be off, or one that is not
+    /// above `enough`.
+    fn nearest(&mut self, of: u32, point: Vec3, enough: f32) -> (f32, TriangleId) {
+        let near = self.search.nearest(point, enough - self.from.off(of));
+        (near.squared.sqrt() + self.off(of, near.id), near.id)
     }
 
-    /// How far the other surface may be off at a triangle.
-    fn off(&self, at: TriangleId) -> f32 {
-        self.search.original().off(at.part)
+    /// How far a mesh and the other surface at a triangle may be off, added up.
+    fn off(&self, of: u32, at: TriangleId) -> f32 {
+        self.from.off(of) + self.search.original().off(at.part)
     }
 
     /// Measures the centre of a part that reaches so far from there, to no less than what settles
     /// it.
-    fn measure_near(&mut self, centre: Vec3, reach: f32) -> (f32, TriangleId) {
+    fn measure_near(&mut self, of: u32, centre: Vec3, reach: f32) -> (f32, TriangleId) {
         let settling = self.largest.limit() - reach;
-        self.measure(centre, settling)
+        self.measure(of, centre, settling)
     }
 
     fn child(&mut self, part: u32, child: u32, bounds: Box3, open: &mut Vec<Open>) {
@@ -196,7 +194,7 @@ impl<'a> Directed<'a> {
         let limit = self.largest.limit();
         // Otherwise not even a centre on the other surface would do.
         if reach < limit {
-            let (distance, _) = self.nearest(bounds.centre(), limit - reach);
+            let (distance, _) = self.nearest(part, bounds.centre(), limit - reach);
             if self.largest.settles(distance + reach) {
                 return;
             }
@@ -236,11 +234,11 @@ impl<'a> Directed<'a> {
                 let centre = (a + b + c) / 3.0;
                 let reach = [a, b, c].map(|corner| corner.distance_squared(centre));
                 let reach = reach.into_iter().fold(0f32, f32::max).sqrt();
-                let (distance, near) = self.measure_near(centre, reach);
+                let (distance, near) = self.measure_near(part, centre, reach);
                 bounds[chosen] = bounds[chosen].min(distance + reach);
                 near
             });
-            let off = self.off(start);
+            let off = self.off(part, start);
             let triangle = self.search.original().triangle(start);
             let squared = [0, 1, 2].map(|corner| triangle.squared_distances(&corners[corner]));
             let [a, b, c] = squared;
@@ -259,7 +257,7 @@ impl<'a> Directed<'a> {
             for (corners, squared) in corners.iter().zip(squared) {
                 // Others are known to be nearer than what was found.
                 if marked.is_none() && squared[chosen].sqrt() + off > self.largest.found {
-                    self.measure(corners.lane(chosen), self.largest.found);
+                    self.measure(part, corners.lane(chosen), self.largest.found);
                 }
             }
             let bound = bounds[chosen];
@@ -278,21 +276,33 @@ impl<'a> Directed<'a> {
             return;
         }
         let corners = triangle.corners();
-        let nearest = self.measure((corners[0] + corners[1] + corners[2]) / 3.0, 0.0);
+        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let nearest = self.measure(id.part, centre, 0.0);
         if nearest.1 != start && self.settles_overlay(&triangle, id, nearest.1) {
             return;
         }
+        // Where layers of a folded surface lie on each other at the centre, the walk may begin on
+        // one that ends; there are fewer of them far from it.
+        let reach = |corner: &Vec3| corner.distance_squared(centre);
+        let far = corners.into_iter().max_by(|a, b| reach(a).total_cmp(&reach(b)));
+        let (_, near) = self.measure(id.part, far.unwrap_or(centre), 0.0);
+        if ![start, nearest.1].contains(&near) && self.settles_overlay(&triangle, id, near) {
+            return;
+        }
         let corners = corners.map(|corner| corner.as_dvec3()).to_vec();
-        self.divide(Part { corners, bound, near: Some(nearest) }, left);
+        self.divide(Part { of: id.part, corners, bound, near: Some(nearest) }, left);
     }
 
     fn settles_overlay(&mut self, triangle: &Triangle, id: TriangleId, start: TriangleId) -> bool {
-        let limit = self.largest.limit() - self.most_off;
-        if limit <= 0.0 {
+        let limit = self.largest.limit() - self.from.off(id.part);
+        // What is walked over is within the limit of the triangle.
+        let to = self.search.original();
+        let off = to.most_off_near(Box3::of(triangle.corners()), limit);
+        if limit <= off {
             return false;
         }
-        let bound = self.overlay.bound(triangle, id.slot(), start, limit, self.rounding);
-        bound.is_some_and(|bound| self.largest.settles(bound + self.most_off))
+        let bound = self.overlay.bound(triangle, id.slot(), start, limit - off, self.rounding);
+        bound.is_some_and(|bound| self.largest.settles(bound + off + self.from.off(id.part)))
     }
 
     /// Divides a triangle and what it is divided into, to some number of polygons.
@@ -337,17 +347,17 @@ impl<'a> Directed<'a> {
 
     fn divide_once(&mut self, part: Part, parts: &mut Vec<Part>) {
         self.largest.divisions += 1;
-        let Part { corners, bound, near } = part;
+        let Part { of, corners, bound, near } = part;
         let centre = centroid(&corners);
         let reach = corners.iter().map(|corner| corner.distance_squared(centre));
         let reach = reach.fold(0.0, f64::max).sqrt();
         let (distance, near) =
-            near.unwrap_or_else(|| self.measure_near(centre.as_vec3(), reach as f32));
+            near.unwrap_or_else(|| self.measure_near(of, centre.as_vec3(), reach as f32));
         let bound = bound.min(distance + reach as f32);
         if self.largest.settles(bound) {
             return;
         }
-        let off = self.off(near);
+        let off = self.off(of, near);
         let triangle = self.search.original().triangle(near);
         let (farthest, number) = farthest_corner(&triangle, &corners);
         let bound = bound.min(farthest + off);
@@ -365,12 +375,12 @@ impl<'a> Directed<'a> {
             if let Some(Clipped { inside, outside }) = clipped.flatten() {
                 let (farthest, _) = farthest_corner(&triangle, &inside);
                 if self.largest.settles(farthest + off) {
-                    parts.extend(outside.into_iter().map(|corners| Part::new(corners, bound)));
+                    parts.extend(outside.into_iter().map(|corners| Part::new(of, corners, bound)));
                     return;
                 }
             }
         }
-        self.measure(corners[number].as_vec3(), self.largest.found);
+        self.measure(of, corners[number].as_vec3(), self.largest.found);
         if self.largest.settles(bound) {
             return;
         }
@@ -379,7 +389,7 @@ impl<'a> Directed<'a> {
             halves
                 .into_iter()
                 .filter(|half| !half.is_empty())
-                .map(|corners| Part::new(corners, bound)),
+                .map(|corners| Part::new(of, corners, bound)),
         );
     }
 }

@@ -38,22 +38,14 @@ pub(super) struct Exact {
 /// place, one of them that is a little farther than the nearest must do.
 const MOST_LEAVES: usize = 256;
 
-/// The largest distance both ways. `None` where it would take too long.
-pub(super) fn both_ways(a: &Original, b: &Original) -> Option<Exact> {
-    let magnitude = magnitude(a, b);
+/// The largest distance both ways, and from `beside` to `a`. `None` where it would take too long.
+pub(super) fn both_ways(a: &Original, b: &Original, beside: &Original) -> Option<Exact> {
+    let magnitude = [a, b, beside].map(|surface| surface.bounds.magnitude());
+    let magnitude = magnitude.into_iter().fold(0.0, f32::max).into();
     let there = Walk::new(b, magnitude).over(a)?;
     let mut back = Walk::new(a, magnitude);
     (back.found, back.settled) = (there.found, there.settled);
-    Some(back.over(b)?.exact())
-}
-
-/// The largest distance from points of one surface to another. `None` where it would take too long.
-pub(super) fn one_way(from: &Original, to: &Original) -> Option<Exact> {
-    Some(Walk::new(to, magnitude(from, to)).over(from)?.exact())
-}
-
-fn magnitude(a: &Original, b: &Original) -> f64 {
-    a.bounds.magnitude().max(b.bounds.magnitude()).into()
+    Some(back.over(b)?.over(beside)?.exact())
 }
 
 /// The search for the point that is farthest from a surface.
@@ -192,7 +184,7 @@ fn farthest(corners: &[DVec3], triangle: &Frame) -> Option<(f64, DVec3)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{mesh, surface_of};
+    use super::super::tests::{mesh, surface_error, surface_of};
     use super::*;
     use crate::random::Random;
 
@@ -226,18 +218,19 @@ mod tests {
     #[test]
     fn distances_below_the_rounding_of_f32_are_bounded_tightly() {
         let mut random = Random::new(11, 0);
+        let none = surface_of(&Default::default());
         for bump in [0.0, 1e-6, 1e-5, 1e-4, 1e-3] {
             let fine = sheet(16, 64.0, bump, &mut random);
             let coarse = sheet(1, 64.0, 0.0, &mut random);
             let (fine_surface, coarse_surface) = (surface_of(&fine), surface_of(&coarse));
-            let exact = both_ways(&fine_surface, &coarse_surface).unwrap();
+            let exact = both_ways(&fine_surface, &coarse_surface, &none).unwrap();
             let least = of_vertices(&fine, &coarse_surface);
             assert!(exact.bound >= least.min(exact.found), "{bump}: {exact:?} {least}");
             assert!(exact.bound == 0.0 || exact.bound >= least, "{bump}: {exact:?} {least}");
             let most = 1.2 * least.max(exact.found) + 1.1 * NONE * 64.0;
             assert!(exact.bound <= most, "{bump}: {exact:?} {least}");
             assert!(exact.bound > 0.0 || least < 1e-6, "{bump}: {exact:?} {least}");
-            let measured = super::super::surface_error(&fine_surface, &coarse);
+            let measured = surface_error(&fine_surface, &coarse);
             assert!(measured.bound >= exact.found, "{bump}: {measured:?} {exact:?}");
         }
     }
@@ -250,7 +243,7 @@ mod tests {
             sheet.positions.iter_mut().for_each(|at| at[2] = 3.0);
             surface_of(&sheet)
         });
-        assert_eq!(both_ways(&fine, &coarse), Some(Exact::default()));
-        assert_eq!(one_way(&coarse, &fine), Some(Exact::default()));
+        let none = surface_of(&Default::default());
+        assert_eq!(both_ways(&fine, &coarse, &none), Some(Exact::default()));
     }
 }

@@ -1,16 +1,16 @@
-//! The two-sided distance between a simplified mesh and the original, bounded and measured.
+//! The two-sided distance between a node and the source, bounded and measured.
 //!
+//! - [`Below`]: what a node is measured against
 //! - [`Original`]: a surface that is searched, of one mesh or of several
 //! - `bvh`, `triangle`: its hierarchy, and eight triangles at a time
 //! - `directed`, `polygon`: the bound on the largest distance, one way
 //! - `exact`: the same in f64, for surfaces that f32 cannot tell apart
 //! - `overlay`, `adjacency`: proving that a triangle is near by walking over the other surface
-//! - `detail`: the same where the original is known by surfaces that are off it themselves
 //! - `samples`: points for the mean, and [`MeanDistance`] to choose among meshes by it
 
 mod adjacency;
+mod below;
 mod bvh;
-mod detail;
 mod directed;
 mod exact;
 mod mean;
@@ -22,30 +22,16 @@ mod samples;
 mod stored;
 mod triangle;
 
-pub use self::detail::{Detail, error_through};
+pub use self::below::{Below, BoundedNode, Surface, measured_against};
 pub use self::directed::TIGHTNESS;
 use self::directed::{Directed, Largest, seed};
 pub use self::mean::MeanDistance;
 pub use self::nearest::NearestTriangle;
 use self::original::Search;
 pub use self::original::{Face, Original};
-use crate::mesh::Mesh;
+pub use self::stored::SurfaceError;
 
-/// How far two surfaces are apart, metres, both ways.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SurfaceError {
-    /// No point of one surface is farther from the other (an upper bound of the Hausdorff
-    /// distance). 0 where they are equal to within a tenth of what rounding coordinates to f32 does.
-    pub bound: f64,
-    /// Of points of both surfaces, evenly spread by area, half of them of each: the mean distance.
-    pub mean: f64,
-    /// Of the same points: the root of the mean squared distance.
-    pub rms: f64,
-    /// Of the same points: 95 of 100 are not farther.
-    pub p95: f64,
-}
-
-/// [`surface_error`], and how it was found.
+/// [`SurfaceError`], and how it was found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
     /// The result.
@@ -58,44 +44,48 @@ pub struct Measured {
     pub divisions: usize,
 }
 
-/// Distance between a simplified mesh and the original, both ways.
+/// Distance between a node and what is below it, both ways, without what the source is off itself.
+/// The bound is no less than that of the nodes below.
+///
+/// `beside` are triangles that are drawn with the node but cover nothing: they count from there to
+/// what is below alone.
 ///
 /// Where only one of them has triangles, all numbers are the diagonal of its bounding box: as far
 /// as anything that is drawn in place of it could be wrong. Infinite where coordinates are not
 /// finite.
-pub fn surface_error(original: &Original, simplified: &Mesh) -> SurfaceError {
-    measure(original, simplified).error
-}
-
-/// [`surface_error`], and how it was found.
-pub fn measure(original: &Original, simplified: &Mesh) -> Measured {
-    let simplified = &Original::of(simplified, original.constants);
+pub fn measure(below: &Below, node: &Original, beside: &Original) -> Measured {
+    let (source, surface) = (&below.source, &below.surface());
     let all = |distance: f64| {
-        let error = SurfaceError { bound: distance, mean: distance, rms: distance, p95: distance };
+        let error = SurfaceError::everywhere(distance);
         Measured { error, largest: distance, ..Default::default() }
     };
-    let rounding = rounding(original, simplified);
+    let rounding =
+        [node, beside].map(|node| rounding(surface, node)).into_iter().fold(0.0, f32::max);
     if !rounding.is_finite() {
         return all(f64::INFINITY);
     }
-    if original.is_empty() || simplified.is_empty() {
-        return all(original.diagonal().max(simplified.diagonal()));
+    if surface.is_empty() || node.is_empty() {
+        return all(surface.diagonal().max(node.diagonal()).max(below.bound()));
     }
-    let mut largest = Largest::at_least(2.0 * rounding);
-    seed(original, simplified, &mut largest);
-    seed(simplified, original, &mut largest);
-    // This way first: each of its triangles settles several of the original.
-    let (largest, marks) = Directed::new(simplified, original, largest, rounding).run();
-    let back = Directed::new(original, simplified, largest, rounding).with_marks(marks);
-    let (largest, _) = back.run();
+    let least = (LEAST_ROUNDING * rounding).max(below.bound() as f32);
+    let mut largest = Largest::at_least(least);
+    seed(surface, node, &mut largest);
+    seed(node, surface, &mut largest);
+    if !beside.is_empty() {
+        (largest, _) = Directed::new(beside, surface, largest, rounding).run();
+    }
+    // This way first: each of its triangles settles several of those below.
+    let (largest, marks) = Directed::new(node, surface, largest, rounding).run();
+    let (largest, _) = Directed::new(surface, node, largest, rounding).with_marks(marks).run();
     let bound = f64::from(largest.bound()) * (1.0 + RELATIVE_ROUNDING) + f64::from(rounding);
     let is_near = largest.found <= NEAR_ROUNDING * rounding;
-    let exact = is_near.then(|| exact::both_ways(original, simplified)).flatten();
+    let exact = is_near.then(|| exact::both_ways(surface, node, beside)).flatten();
     let (found, bound) = match exact {
-        Some(exact) => (exact.found, exact.bound.min(bound)),
+        Some(exact) => (exact.found, bound.min(exact.bound + f64::from(surface.most_off()))),
         None => (largest.found.into(), bound),
     };
-    let (mean, rms, p95) = statistics(original, simplified, bound);
+    let bound = bound.max(below.bound());
+    let (mean, rms, p95) = statistics(source, node, bound);
     Measured {
         error: SurfaceError { bound, mean, rms, p95 },
         largest: found,
@@ -114,6 +104,9 @@ fn rounding(a: &Original, b: &Original) -> f32 {
     let magnitude = a.bounds.magnitude().max(b.bounds.magnitude());
     f32::EPSILON * (magnitude + 12.0 * a.longest.max(b.longest))
 }
+
+/// Distances below so many times [`rounding`] are not told apart in f32.
+const LEAST_ROUNDING: f32 = 2.0 * TIGHTNESS;
 
 /// Distances below so many times [`rounding`] are measured again in f64: rounding would be a large
 /// part of the bound.

@@ -1,17 +1,17 @@
 //! The surface that a chunk had before simplification.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec3, Vec3};
 
 use super::adjacency::{Adjacency, Links, Slot};
 use super::bvh::{Box3, Bvh, LEAF, Node, Tree};
 use super::samples::Samples;
-use super::triangle::{LANES, Triangle, min};
+use super::triangle::{LANES, Triangle, max, min};
 use crate::builder::constants::MeasureConstants;
 use crate::mesh::Mesh;
 
-/// The original surface of a chunk, searchable; built once and shared by all levels above it.
+/// A surface of one or several meshes, searchable; built once and shared by all levels above it.
 /// Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Original {
@@ -20,14 +20,15 @@ pub struct Original {
     top: Arc<Tree>,
     /// The part of each leaf.
     numbers: Vec<u32>,
-    /// Where parts meet.
-    pub(super) links: Arc<Links>,
+    /// Where parts meet; computed when first needed.
+    links: Arc<OnceLock<Links>>,
     pub(super) bounds: Box3,
     /// The longest edge.
     pub(super) longest: f32,
     /// How it is measured.
     pub(super) constants: MeasureConstants,
-    /// How far each part may be off what it stands for, metres; empty where no part is.
+    /// A bound of the distance between each part and the source, both ways, metres; empty where
+    /// all are 0.
     offs: Arc<[f32]>,
 }
 
@@ -164,11 +165,19 @@ impl Original {
         })
     }
 
-    /// Several surfaces as one. Their triangles are shared, not copied.
-    pub fn union(parts: Vec<Arc<Self>>) -> Self {
+    /// Several surfaces as one, each with its offs. Their triangles are shared, not copied.
+    pub fn union(parts: &[Arc<Self>]) -> Self {
         let constants = parts.first().map_or_else(Default::default, |part| part.constants);
         let all = parts.iter().flat_map(|part| part.parts.iter().cloned());
-        Self::from_parts(all.collect(), constants)
+        let union = Self::from_parts(all.collect(), constants);
+        if parts.iter().all(|part| part.offs.is_empty()) {
+            return union;
+        }
+        let offs = |part: &Arc<Self>| {
+            let part = Arc::clone(part);
+            (0..part.parts.len() as u32).map(move |number| part.off(number))
+        };
+        Self { offs: parts.iter().flat_map(offs).collect(), ..union }
     }
 
     /// What the triangle nearest to a point looks like; `None` where [`Self::faces`] has none.
@@ -188,26 +197,40 @@ impl Original {
             numbers: leaves.into_iter().flatten().collect(),
             bounds: boxes.into_iter().fold(Box3::EMPTY, Box3::and),
             longest: parts.iter().map(|part| part.bvh.longest).fold(0.0, f32::max),
-            links: Arc::new(Links::between(parts.iter().map(|part| &part.adjacency))),
+            links: Arc::default(),
             parts,
             constants,
             offs: Arc::default(),
         }
     }
 
-    /// The same surface, whose parts stand for others that they may be so far off, metres.
-    pub(super) fn with_offs(self, offs: impl IntoIterator<Item = f32>) -> Self {
-        Self { offs: offs.into_iter().collect(), ..self }
+    /// The same surface, at most `off` metres from the source, both ways.
+    pub fn with_off(self, off: f64) -> Self {
+        let count = if off > 0.0 { self.parts.len() } else { 0 };
+        Self { offs: vec![off as f32; count].into(), ..self }
     }
 
-    /// How far a part may be off what it stands for.
+    /// A bound of the distance between a part and the source, metres.
     pub(super) fn off(&self, part: u32) -> f32 {
         self.offs.get(part as usize).copied().unwrap_or(0.0)
     }
 
-    /// The most that any part is.
+    /// The largest of all parts.
     pub(super) fn most_off(&self) -> f32 {
         self.offs.iter().copied().fold(0.0, f32::max)
+    }
+
+    /// The largest of the parts whose boxes are within `reach` of a box along each axis.
+    pub(super) fn most_off_near(&self, bounds: Box3, reach: f32) -> f32 {
+        let near = self.parts.iter().zip(&*self.offs);
+        let near = near.filter(|(part, _)| part.bvh.bounds.is_within(reach, bounds));
+        near.map(|(_, &off)| off).fold(0.0, f32::max)
+    }
+
+    /// Where parts meet.
+    pub(super) fn links(&self) -> &Links {
+        let adjacencies = || self.parts.iter().map(|part| &part.adjacency);
+        self.links.get_or_init(|| Links::between(adjacencies()))
     }
 
     /// Whether there is no triangle.
@@ -218,6 +241,11 @@ impl Original {
     /// Of the bounding box; 0 where there is no triangle.
     pub(super) fn diagonal(&self) -> f64 {
         if self.is_empty() { 0.0 } else { self.bounds.diagonal().into() }
+    }
+
+    /// Of all triangles, square metres.
+    pub fn area(&self) -> f64 {
+        self.parts.iter().map(|part| part.samples.area).sum()
     }
 
     /// How many triangles there are.
@@ -292,7 +320,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The nearest triangle, or one that is not farther than `enough`.
+    /// The nearest triangle, or one that is not farther than `enough`, its off included.
     pub fn nearest(&mut self, point: Vec3, enough: f32) -> Near {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
@@ -310,13 +338,16 @@ impl<'a> Search<'a> {
 
     #[inline(always)]
     fn nearest_portable(&mut self, point: Vec3, enough: f32) -> Near {
-        let enough = if enough > 0.0 { enough * enough } else { 0.0 };
+        let is_enough = |best: &Near| {
+            let enough = max(enough - self.original.off(best.id.part), 0.0);
+            best.squared <= enough * enough
+        };
         let at = point;
         let mut best = Near { squared: f32::INFINITY, id: self.last };
         let first = self.last;
         self.leaf(first.part, first.leaf, at, &mut best);
         let Original { parts, top, numbers, .. } = self.original;
-        if best.squared > enough {
+        if !is_enough(&best) {
             self.stack.clear();
             let start = match &parts[..] {
                 [part] => (0.0, 0, part.bvh.tree.root),
@@ -335,7 +366,7 @@ impl<'a> Search<'a> {
                     self.stack.push((squared, part, parts[part as usize].bvh.tree.root));
                 } else if (part, child & !LEAF) != (first.part, first.leaf) {
                     self.leaf(part, child & !LEAF, at, &mut best);
-                    if best.squared <= enough {
+                    if is_enough(&best) {
                         break;
                     }
                 }

@@ -12,7 +12,7 @@
 
 use glam::{Vec2, Vec3, Vec3A, Vec3Swizzles};
 
-use super::adjacency::{Linked, Slot};
+use super::adjacency::{Linked, Links, Slot};
 use super::original::{Original, TriangleId};
 use super::triangle::{Triangle, max, min};
 use crate::builder::constants::MeasureConstants;
@@ -54,7 +54,7 @@ pub(super) struct Marks {
     firsts: Vec<usize>,
     /// Of each slot, which walk visited it last, and what is known.
     slots: Vec<(u32, Mark)>,
-    /// No point of a triangle that is marked as settled is farther.
+    /// No point of a triangle that is marked as settled is farther, its off included.
     pub farthest: f32,
 }
 
@@ -79,6 +79,7 @@ impl Marks {
 /// Visits triangles of a surface.
 pub(super) struct Overlay<'a> {
     original: &'a Original,
+    links: &'a Links,
     marks: Marks,
     now: u32,
     queue: Vec<Visited>,
@@ -94,7 +95,8 @@ struct Visited {
 
 impl<'a> Overlay<'a> {
     pub fn new(original: &'a Original) -> Self {
-        Self { original, marks: Marks::new(original), now: 0, queue: Vec::new() }
+        let (links, marks) = (original.links(), Marks::new(original));
+        Self { original, links, marks, now: 0, queue: Vec::new() }
     }
 
     /// What was learnt of the surface that was walked over.
@@ -137,7 +139,8 @@ impl<'a> Overlay<'a> {
                     *mark = Mark::SETTLED;
                     // Also where the walk fails, and its bound counts for nothing.
                     let height = seen.height.abs().max_element() + margin;
-                    let farthest = min(limit, height.hypot(limit * aside));
+                    let off = self.original.off(part);
+                    let farthest = min(limit, height.hypot(limit * aside)) + off;
                     self.marks.farthest = max(self.marks.farthest, farthest);
                 } else if *mark == Mark::NONE || seen.is_centred() {
                     *mark = Mark::near(slot);
@@ -151,7 +154,7 @@ impl<'a> Overlay<'a> {
                 match linked.across(edge) {
                     Some(neighbour) => self.visit(part, neighbour),
                     None => {
-                        let (part, slot) = self.original.links.across(part, other, edge)?;
+                        let (part, slot) = self.links.across(part, other, edge)?;
                         self.visit(part, slot);
                     }
                 }

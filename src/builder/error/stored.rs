@@ -1,6 +1,18 @@
 //! What a node stores of its error.
 
-use super::SurfaceError;
+/// How far two surfaces are apart, metres, both ways.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SurfaceError {
+    /// No point of one surface is farther from the other (an upper bound of the Hausdorff
+    /// distance). 0 where they are equal to within a tenth of what rounding coordinates to f32 does.
+    pub bound: f64,
+    /// Of points of both surfaces, evenly spread by area, half of them of each: the mean distance.
+    pub mean: f64,
+    /// Of the same points: the root of the mean squared distance.
+    pub rms: f64,
+    /// Of the same points: 95 of 100 are not farther.
+    pub p95: f64,
+}
 
 impl SurfaceError {
     /// All of a surface is so many metres off.
@@ -8,19 +20,11 @@ impl SurfaceError {
         Self { bound: metres, mean: metres, rms: metres, p95: metres }
     }
 
-    /// The same of an original that is itself so far off the source, at most: of distances, the
-    /// triangle inequality.
+    /// The same of a surface that is itself so far off the source (the triangle inequality).
     pub fn plus(self, off: &Self) -> Self {
-        Self {
-            bound: self.bound + off.bound,
-            mean: self.mean + off.mean,
-            rms: self.rms + off.rms,
-            p95: self.p95 + off.p95,
-        }
-    }
-
-    /// With the bound of another where that is larger: bounds never shrink towards the root.
-    pub fn at_least(self, other: &Self) -> Self {
-        Self { bound: self.bound.max(other.bound), ..self }
+        let bound = self.bound + off.bound;
+        let [mean, rms, p95] =
+            [self.mean + off.mean, self.rms + off.rms, self.p95 + off.p95].map(|e| e.min(bound));
+        Self { bound, mean, rms, p95 }
     }
 }

@@ -6,7 +6,7 @@ use super::*;
 use crate::builder::border::vertex::{Border, Path};
 use crate::builder::constants::{Constants, MeasureConstants};
 use crate::builder::simplify::ladder::{AppearanceWeights, Method, Simplifier, simplify};
-use crate::mesh::UpAxis;
+use crate::mesh::{Mesh, UpAxis};
 use crate::random::Random;
 
 fn point(random: &mut Random, size: f32) -> [f32; 3] {
@@ -16,6 +16,16 @@ fn point(random: &mut Random, size: f32) -> [f32; 3] {
 /// To be measured with the constants that builds use.
 pub(super) fn surface_of(mesh: &Mesh) -> Original {
     Original::of(mesh, MeasureConstants::default())
+}
+
+/// Measures a mesh against a source.
+pub(super) fn measure(source: &Original, mesh: &Mesh) -> Measured {
+    let (below, none) = (Below::source(source.clone(), 0.0), surface_of(&Mesh::default()));
+    super::measure(&below, &surface_of(mesh), &none)
+}
+
+pub(super) fn surface_error(source: &Original, mesh: &Mesh) -> SurfaceError {
+    measure(source, mesh).error
 }
 
 pub(super) fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Mesh {
@@ -197,7 +207,7 @@ fn nothing_is_as_far_as_what_it_stands_for_is_large() {
     assert_eq!(surface_error(&some, &Mesh::default()).bound, diagonal);
     assert_eq!(surface_error(&none, &flat).bound, diagonal);
     assert_eq!(surface_error(&none, &Mesh::default()), SurfaceError::default());
-    assert!(Original::union(Vec::new()).is_empty());
+    assert!(Original::union(&[]).is_empty());
 }
 
 /// A hole in the middle of a triangle whose corners all stay, which no vertex is far from.
@@ -279,11 +289,8 @@ fn a_union_is_as_its_parts_in_one() {
         all.triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
     }
     let some: Vec<Arc<Original>> = parts.iter().map(|part| Arc::new(surface_of(part))).collect();
-    let nested = Original::union(vec![
-        Arc::new(Original::union(some[..4].to_vec())),
-        Arc::new(Original::union(some[4..].to_vec())),
-        Arc::new(Original::union(Vec::new())),
-    ]);
+    let parts = [&some[..4], &some[4..], &[]].map(|part| Arc::new(Original::union(part)));
+    let nested = Original::union(&parts);
     assert_eq!(nested.triangle_count(), all.triangles.len());
     let other = moved(&sheet(&mut random, 19, 0.5), [0.1, 0.2, 0.3]);
     let [one, of_parts] = [&surface_of(&all), &nested].map(|original| measure(original, &other));
@@ -392,4 +399,42 @@ fn a_plane_of_fewer_triangles_is_at_no_distance() {
         let measured = measure(&original, &fewer);
         assert_eq!(measured.error.bound, 0.0, "{target}: {measured:?}");
     }
+}
+
+/// A sheet of 64 m with a bump, of `side` times `side` squares, each cut in two.
+fn square_sheet(side: u32, bump: f32) -> Mesh {
+    let size = 64.0 / side as f32;
+    let mut sheet = Mesh::default();
+    for at in 0..(side + 1) * (side + 1) {
+        let [x, y] = [at % (side + 1), at / (side + 1)].map(|at| at as f32 * size);
+        let is_bump = at == (side + 1) * (side / 2) + side / 2;
+        sheet.positions.push([x, y, if is_bump { bump } else { 0.0 }]);
+        if x < 64.0 && y < 64.0 {
+            let [a, b, c, d] = [at, at + 1, at + side + 2, at + side + 1];
+            sheet.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    sheet.materials = vec![0; sheet.positions.len()];
+    sheet
+}
+
+/// Flaps that lie on a sheet under the centres of triangles: a walk that begins on one of them
+/// comes to its end.
+#[test]
+fn layers_on_each_other_need_few_divisions() {
+    let node = square_sheet(7, 0.0);
+    let mut source = square_sheet(16, 0.05);
+    for corners in corners(&node) {
+        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+        for _ in 0..2 {
+            let first = source.positions.len() as u32;
+            let flap = corners.map(|corner| centre.lerp(corner, 0.3).as_vec3().to_array());
+            source.positions.extend(flap);
+            source.triangles.push([first, first + 1, first + 2]);
+        }
+    }
+    source.materials = vec![0; source.positions.len()];
+    let measured = measure(&surface_of(&source), &node);
+    assert!((0.05..0.056).contains(&measured.error.bound), "{measured:?}");
+    assert!(measured.divisions < 500, "{measured:?}");
 }

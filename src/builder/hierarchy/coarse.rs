@@ -15,7 +15,7 @@ use crate::builder::border::skirt_rules::SkirtRules;
 use crate::builder::border::span::{BorderSpan, join_spans};
 use crate::builder::border::thin::thin_border;
 use crate::builder::border::vertex::{Border, Path};
-use crate::builder::error::{Original, SurfaceError, surface_error};
+use crate::builder::error::{Below, Original, measure};
 use crate::builder::simplify::compact::compact;
 use crate::builder::simplify::face_colors::with_face_colors;
 use crate::builder::simplify::fallback::fallback_triangles;
@@ -37,12 +37,10 @@ pub(super) struct NodeSurface {
     pub border: Border,
     /// The spans of its border, if skirts are to cover them.
     pub spans: Vec<BorderSpan>,
-    /// What it stands for.
+    /// The surface whose outline and colours it keeps.
     pub original: Arc<Original>,
-    /// How far rounding has moved the original off the source, metres at most.
-    pub moved: f64,
-    /// Of the worst of the nodes below, which this one may not fall below.
-    pub error: SurfaceError,
+    /// What it is measured against.
+    pub below: Below,
     /// A texture of its own stands for its texture coordinates.
     pub baked: bool,
 }
@@ -102,29 +100,20 @@ impl<R> Outcome<R> {
 /// are along the axis, as a share of its longest edge, at most: it then lies in a cutting plane.
 const IN_PLANE: (f64, f64) = (0.99, 0.01);
 
-/// The mesh with the skirt triangles that lie in no cutting plane: from a border vertex beside the
-/// plane to the plane. They are seen as surface, so they count in the distance from the original.
-fn with_skirts_beside<'a>(mesh: &'a Mesh, skirts: &[Skirt]) -> Cow<'a, Mesh> {
-    let mut beside: Vec<[[f32; 3]; 3]> = Vec::new();
+/// The skirt triangles that lie in no cutting plane: from a border vertex beside the plane to the
+/// plane. They are seen as surface, so they must be near the source; but they stand for none of it.
+fn skirts_beside(mesh: &Mesh, skirts: &[Skirt]) -> Mesh {
+    let mut positions: Vec<[f32; 3]> = Vec::new();
     for Skirt { edge, corners, triangles } in skirts {
         let position = |corner: u8| match usize::from(corner) {
             end @ (0 | 1) => mesh.positions[edge[end] as usize],
             corner => corners[corner - 2].0,
         };
         let all = triangles.iter().map(|triangle| triangle.map(position));
-        beside.extend(all.filter(|&corners| !lies_in_plane(corners)));
+        positions.extend(all.filter(|&corners| !lies_in_plane(corners)).flatten());
     }
-    if beside.is_empty() {
-        return Cow::Borrowed(mesh);
-    }
-    let (mut positions, mut triangles) = (mesh.positions.clone(), mesh.triangles.clone());
-    for corners in beside {
-        let first = positions.len() as u32;
-        positions.extend(corners);
-        triangles.push([first, first + 1, first + 2]);
-    }
-    let materials = vec![0; positions.len()];
-    Cow::Owned(Mesh { positions, triangles, materials, ..Mesh::default() })
+    let triangles = (0..positions.len() as u32 / 3).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]);
+    Mesh { triangles: triangles.collect(), positions, ..Mesh::default() }
 }
 
 fn lies_in_plane(corners: [[f32; 3]; 3]) -> bool {
@@ -146,30 +135,22 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         source: NodeSurface,
         node: CoarseNode,
     ) -> Result<(Outcome<S::Record>, NodeSurface)> {
-        let off = SurfaceError::everywhere(source.moved);
-        let measure = |original: &Original, mesh: &Mesh| {
-            Ok(self.stages.time(Stage::Measure, || surface_error(original, mesh)).plus(&off))
-        };
-        self.measured_node(source, node, measure)
-    }
-
-    /// The same where the distance of a mesh from the source is measured so.
-    pub(super) fn measured_node(
-        &self,
-        source: NodeSurface,
-        node: CoarseNode,
-        measure: impl FnOnce(&Original, &Mesh) -> Result<SurfaceError>,
-    ) -> Result<(Outcome<S::Record>, NodeSurface)> {
         let Attempt { coarse, reason, kept, within_budget } = self.attempt(&source, &node);
-        let NodeSurface { original, moved, error: below, .. } = source;
+        let NodeSurface { original, below, .. } = source;
         let Coarse { simplified: Simplified { mesh, border, step, .. }, spans, skirts } = coarse;
-        let (outcome, error) = if kept.least() < self.options.constants.outline.least_kept {
+        let (outcome, below) = if kept.least() < self.options.constants.outline.least_kept {
             let triangles = (mesh.triangles.len() + triangles_of(&skirts)) as u64;
             let child_path = node.child_path.to_vec();
             // Nobody draws it: what is above need not be farther off than what is below.
             (Outcome::LeftOut(LeftOut { child_path, triangles, kept }), below)
         } else {
-            let error = measure(&original, &with_skirts_beside(&mesh, &skirts))?.at_least(&below);
+            let constants = self.options.constants.measure;
+            let (surface, error) = self.stages.time(Stage::Measure, || {
+                let surface = Original::of(&mesh, constants);
+                let beside = Original::of(&skirts_beside(&mesh, &skirts), constants);
+                let error = measure(&below, &surface, &beside).error;
+                (surface, error)
+            });
             let on_border = |&&planes: &&u64| planes & node.path.bits() != 0;
             // Of what is written alone: parents take their colours from the original, too.
             let painted =
@@ -185,15 +166,15 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
                 child_path: node.child_path,
                 budget: node.budget,
                 within_budget,
-                error,
+                error: error.plus(&below.off),
                 step,
                 baked: reason,
                 locked: border.planes.iter().filter(on_border).count(),
             })?;
-            (Outcome::Written(record), error)
+            (Outcome::Written(record), below.above(surface, error.bound))
         };
         let baked = reason.is_some();
-        Ok((outcome, NodeSurface { mesh, border, spans, original, moved, error, baked }))
+        Ok((outcome, NodeSurface { mesh, border, spans, original, below, baked }))
     }
 
     /// Simplifies a node, and again with more and more triangles where it keeps too little of the
@@ -337,8 +318,8 @@ mod tests {
             corners: vec![([x, 9.0, -0.5], 0)],
             triangles: vec![[0, 1, 2]],
         };
-        assert!(matches!(with_skirts_beside(&mesh, &[skirt(4.0)]), Cow::Borrowed(_)));
-        let with = with_skirts_beside(&mesh, &[skirt(4.0), skirt(3.0)]);
-        assert_eq!((with.triangles.len(), with.positions.len()), (2, 6));
+        assert_eq!(skirts_beside(&mesh, &[skirt(4.0)]), Mesh::default());
+        let beside = skirts_beside(&mesh, &[skirt(4.0), skirt(3.0)]);
+        assert_eq!((beside.triangles.len(), beside.positions.len()), (1, 3));
     }
 }

@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-pub use self::above::Below;
+pub use self::above::MemberSurfaces;
 pub use self::node::{Forest, NodeDraft, NodeSink, Tree};
 pub use self::options::{BorderMode, HierarchyOptions, TreeShape};
 pub use self::outline::LeftOut;
@@ -29,7 +29,7 @@ use crate::Result;
 use crate::builder::border::span::original_spans;
 use crate::builder::border::vertex::Border;
 use crate::builder::cut::split::Chunk;
-use crate::builder::error::{Original, SurfaceError};
+use crate::builder::error::{Below, Original, SurfaceError};
 use crate::builder::simplify::aggregate::{BodyRules, Extrudable, has_many_bodies};
 use crate::builder::simplify::compact::renumber;
 use crate::builder::simplify::merge::merge;
@@ -201,15 +201,15 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         node: &CoarseNode,
     ) -> NodeSurface {
         let constants = self.options.constants.measure;
-        let of_mesh = || Arc::new(Original::of(&source_of(&mesh, &stitches), constants));
-        let original = self.stages.time(Stage::Measure, of_mesh);
+        let of_mesh = || Original::of(&source_of(&mesh, &stitches), constants);
+        let below = Below::source(self.stages.time(Stage::Measure, of_mesh), moved);
         mesh.triangles.append(&mut stitches);
         let spans = match self.options.borders {
             BorderMode::Skirts => original_spans(&mesh, &border, node.path),
             BorderMode::Locked => Vec::new(),
         };
-        let error = SurfaceError::everywhere(moved);
-        NodeSurface { mesh, border, spans, original, moved, error, baked: false }
+        let original = Arc::clone(&below.source);
+        NodeSurface { mesh, border, spans, original, below, baked: false }
     }
 }
 
@@ -227,14 +227,10 @@ fn join(parts: Vec<NodeSurface>, planes: usize) -> NodeSurface {
     let pairs: Vec<(&Mesh, &Border)> =
         parts.iter().map(|part| (&part.mesh, &part.border)).collect();
     let (mesh, border) = merge(&pairs, planes);
-    let original = Original::union(parts.iter().map(|part| Arc::clone(&part.original)).collect());
-    NodeSurface {
-        mesh,
-        border,
-        original: Arc::new(original),
-        moved: parts.iter().map(|part| part.moved).fold(0.0, f64::max),
-        error: parts.iter().fold(SurfaceError::default(), |most, part| most.at_least(&part.error)),
-        baked: parts.iter().any(|part| part.baked),
-        spans: parts.into_iter().flat_map(|part| part.spans).collect(),
-    }
+    let baked = parts.iter().any(|part| part.baked);
+    let (spans, below): (Vec<_>, Vec<_>) =
+        parts.into_iter().map(|part| (part.spans, part.below)).unzip();
+    let below = Below::join(below);
+    let original = Arc::clone(&below.source);
+    NodeSurface { mesh, border, spans: spans.concat(), original, below, baked }
 }

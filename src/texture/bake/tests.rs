@@ -10,7 +10,8 @@ use crate::format::{NodeImageData, NodeMesh};
 use crate::mesh::{Group, Material, Mesh, Model, Part, TextureData, TextureSource};
 use crate::random::Random;
 use crate::texture::{
-    AppendedSkirts, BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan,
+    AppendedSkirts, BlockTextures, DecodedImages, SharedTextures, TextureCache, TextureOptions,
+    TexturePlan,
 };
 
 /// A surface over a grid of `side` by `side` squares, without texture.
@@ -174,7 +175,9 @@ fn torn(mesh: &Mesh, color: impl Fn(DVec3, DVec3) -> [u8; 3]) -> (Model, Mesh) {
 fn bake(model: &Model, mesh: &Mesh, coarse: &Mesh) -> NodeMesh {
     let plan = TexturePlan::new(model);
     let shared = SharedTextures::new();
-    let cache = TextureCache::new(model, &plan, [[0u32]]);
+    let images = DecodedImages::default();
+    let announced = images.announce(model, &plan, [0]);
+    let cache = TextureCache::new(model, &plan, &announced);
     let options = TextureOptions { jpeg_quality: 100, root_triangles: 0, ..Default::default() };
     let block = BlockTextures::prepare(&cache, &shared, mesh, &[16.0, 4.0, 1.0], options);
     let baked = block.bake(coarse, 1).expect("bakes");

@@ -61,7 +61,7 @@ fn walks_lead_from_part_to_part() {
         Arc::new(surface_of(&Mesh { triangles, ..whole.clone() }))
     };
     let count = |bounds: Vec<Option<f32>>| bounds.into_iter().flatten().count();
-    let of_halves = count(bounds(&Original::union(vec![half(true), half(false)])));
+    let of_halves = count(bounds(&Original::union(&[half(true), half(false)])));
     assert_eq!(of_halves, count(bounds(&surface_of(&whole))));
 }
 

@@ -13,12 +13,10 @@ mod extrudable;
 mod floors;
 mod look;
 mod prisms;
-mod side_by_side;
 
 pub use self::extrudable::Extrudable;
 pub use self::floors::without_floors;
 use self::prisms::{Body, prisms};
-use self::side_by_side::rows;
 use crate::builder::constants::PrismConstants;
 use crate::builder::simplify::parts::{Part, parts};
 use crate::mesh::{Coordinate, Mesh, UpAxis};
@@ -44,24 +42,6 @@ impl BodyRules<'_> {
         };
         let body = || Body::of(mesh, &part.triangles, self.up, self.constants);
         part.triangles.iter().all(may).then(body).flatten()
-    }
-
-    /// How many bodies, as [`Self::crowd`] counts them, a block may have whose root has so many
-    /// triangles.
-    pub fn most_bodies(&self, target: usize) -> usize {
-        let each = self.constants.least_per_body;
-        if each > 0.0 { (target as f64 / each) as usize } else { usize::MAX }
-    }
-
-    /// How many separate bodies a mesh has, where each of several side by side counts about half:
-    /// they may become one block.
-    pub fn crowd<C: Coordinate>(&self, mesh: &Mesh<C>) -> usize {
-        if !self.any() {
-            return 0;
-        }
-        let parts = parts(mesh);
-        let bodies: Vec<Body> = parts.iter().filter_map(|part| self.body(mesh, part)).collect();
-        if bodies.is_empty() { 0 } else { (bodies.len() + rows(&bodies)).div_ceil(2) }
     }
 
     /// Whether prisms are wanted at all.
@@ -208,8 +188,6 @@ mod tests {
         let kept = BodyRules { extrudable: &[false], ..rules(&constants) };
         assert!(extrude(&textured, &free, 600, &kept).is_none());
         assert_eq!((rules(&constants).count(&textured), kept.count(&textured)), (100, 0));
-        // Houses of 8 by 10 m, 6 and 12 m apart.
-        assert_eq!((rules(&constants).crowd(&textured), kept.crowd(&textured)), (100, 0));
         let mut locked = free.clone();
         locked[0] = true;
         let kept = extrude(&mesh, &locked, 600, &rules(&constants)).unwrap().rest;

@@ -9,9 +9,6 @@ use crate::mesh::{Coordinate, Mesh, UpAxis, wide};
 /// A separate body with walls and roofs, whichever way its faces wind.
 pub(in super::super) struct Body<'a> {
     pub triangles: &'a [[u32; 3]],
-    /// The box around it, seen from above.
-    pub low: DVec2,
-    pub high: DVec2,
     /// What it covers of the ground, about, square metres.
     pub footprint: f64,
     pub roof: Look,
@@ -57,7 +54,6 @@ impl<'a> Body<'a> {
         let size: DVec2 = (high - low).truncate();
         let is_body = height > constants.least_height * footprint.sqrt()
             && walls >= constants.least_walls * 2.0 * size.element_sum() * height;
-        let (low, high) = (low.truncate(), high.truncate());
-        is_body.then_some(Self { triangles, low, high, footprint, roof, wall })
+        is_body.then_some(Self { triangles, footprint, roof, wall })
     }
 }

@@ -1,0 +1,183 @@
+//! Bodies that no plane between blocks divides.
+//!
+//! A house that a plane cuts in two costs both halves a border, which every level keeps part of, and
+//! skirts along it. So a separate body that is small beside its block is of the block that has its
+//! middle, with all its triangles. Which it is follows from the body and the partition alone: each
+//! block finds out by itself, and all agree.
+
+use std::collections::BTreeSet;
+
+use rustc_hash::FxHashMap;
+
+use super::{CellBox, Cluster, Partition};
+use crate::mesh::box_tree::BoxTree;
+use crate::mesh::{DisjointSet, Model, PositionKey, key};
+
+/// The block that has all of a triangle's body; `NONE` where planes divide it.
+pub struct Bodies {
+    /// By part and triangle; empty where no body crosses a plane.
+    blocks: Vec<Vec<u32>>,
+}
+
+/// Of no block.
+const NONE: u32 = u32::MAX;
+
+/// What is known of a body.
+#[derive(Clone, Copy)]
+struct Body {
+    place: CellBox,
+    triangles: usize,
+    block: u32,
+}
+
+impl Bodies {
+    /// The bodies of a model, its triangles connected where they share positions. None with more than
+    /// `most` triangles stays whole, and none that may go on where it is open, in what `others` have.
+    pub fn new(model: &Model, partition: &Partition, most: usize, others: &Others) -> Self {
+        if partition.cells().len() < 2 {
+            return Self { blocks: Vec::new() };
+        }
+        let vertices: usize = model.parts.iter().map(|part| part.positions.len()).sum();
+        let mut sets = DisjointSet::new(vertices);
+        let mut first_at: FxHashMap<PositionKey<f64>, u32> = FxHashMap::default();
+        first_at.reserve(vertices);
+        let positions = model.parts.iter().flat_map(|part| &part.positions);
+        for (vertex, &position) in (0u32..).zip(positions) {
+            let first = *first_at.entry(key(position)).or_insert(vertex);
+            sets.join(first, vertex);
+        }
+        drop(first_at);
+        let mut first = 0u32;
+        for part in &model.parts {
+            for &[a, b, c] in part.indices.as_chunks::<3>().0 {
+                sets.join(first + a, first + b);
+                sets.join(first + a, first + c);
+            }
+            first += part.positions.len() as u32;
+        }
+        let mut bodies: FxHashMap<u32, Body> = FxHashMap::default();
+        let mut first = 0u32;
+        for part in &model.parts {
+            for corners in part.indices.as_chunks::<3>().0 {
+                let own = CellBox::around(corners.map(|vertex| part.positions[vertex as usize]));
+                let new = Body { place: own, triangles: 0, block: NONE };
+                let body = bodies.entry(sets.root(first + corners[0])).or_insert(new);
+                body.triangles += 1;
+                for axis in 0..3 {
+                    body.place.low[axis] = body.place.low[axis].min(own.low[axis]);
+                    body.place.high[axis] = body.place.high[axis].max(own.high[axis]);
+                }
+            }
+            first += part.positions.len() as u32;
+        }
+        for body in bodies.values_mut() {
+            body.block = block_of(body, partition, most);
+        }
+        if !others.is_empty() {
+            for root in open_in(model, &mut sets, &bodies, partition, others) {
+                bodies.entry(root).and_modify(|body| body.block = NONE);
+            }
+        }
+        let mut first = 0u32;
+        let mut blocks = Vec::with_capacity(model.parts.len());
+        for part in &model.parts {
+            let corners = part.indices.as_chunks::<3>().0.iter();
+            let block = |corners: &[u32; 3]| {
+                bodies.get(&sets.root(first + corners[0])).map_or(NONE, |body| body.block)
+            };
+            blocks.push(corners.map(block).collect());
+            first += part.positions.len() as u32;
+        }
+        Self { blocks }
+    }
+
+    /// The block that has all of the body of a triangle of a part, if one has.
+    pub fn block_of(&self, part: usize, triangle: usize) -> Option<u32> {
+        let block = *self.blocks.get(part)?.get(triangle)?;
+        (block != NONE).then_some(block)
+    }
+}
+
+/// Of the bodies that stay whole though planes cross them, those that are open where others have
+/// something: they may be one surface with it.
+fn open_in(
+    model: &Model,
+    sets: &mut DisjointSet,
+    bodies: &FxHashMap<u32, Body>,
+    partition: &Partition,
+    others: &Others,
+) -> BTreeSet<u32> {
+    let crossed = |body: &Body| {
+        body.block != NONE && !partition.cell(body.block).place.holds_within(&body.place)
+    };
+    // By edge: the body, and whether an odd number of triangles has it.
+    let mut edges: FxHashMap<[PositionKey<f64>; 2], (u32, bool, [[f64; 3]; 2])> =
+        FxHashMap::default();
+    let mut first = 0u32;
+    for part in &model.parts {
+        for &[a, b, c] in part.indices.as_chunks::<3>().0 {
+            let root = sets.root(first + a);
+            if !bodies.get(&root).is_some_and(crossed) {
+                continue;
+            }
+            for [from, to] in [[a, b], [b, c], [c, a]] {
+                let ends = [from, to].map(|vertex| part.positions[vertex as usize]);
+                let [one, other] = ends.map(key);
+                let edge = edges.entry([one.min(other), one.max(other)]);
+                let (_, is_open, _) = edge.or_insert((root, false, ends));
+                *is_open = !*is_open;
+            }
+        }
+        first += part.positions.len() as u32;
+    }
+    let open = edges.into_values().filter(|(_, is_open, _)| *is_open);
+    open.filter(|(_, _, ends)| ends.iter().any(|end| others.may_have(end)))
+        .map(|(root, ..)| root)
+        .collect()
+}
+
+/// Surfaces of two inputs may be one that are no farther apart than this share of a triangle's size.
+const NEAR: f64 = 0.01;
+
+/// Where other inputs have something: boxes around their triangles.
+#[derive(Default)]
+pub struct Others {
+    boxes: Option<BoxTree>,
+}
+
+impl Others {
+    /// Of all clusters of other inputs.
+    pub fn new<'a>(clusters: impl Iterator<Item = &'a Cluster>) -> Self {
+        let around = |cluster: &Cluster| {
+            let [low, high] = cluster.around;
+            let near = NEAR * cluster.largest;
+            [low.map(|at| at - near), high.map(|at| at + near)]
+        };
+        let boxes: Vec<[[f64; 3]; 2]> = clusters.map(around).collect();
+        Self { boxes: (!boxes.is_empty()).then(|| BoxTree::new(boxes)) }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.boxes.is_none()
+    }
+
+    fn may_have(&self, place: &[f64; 3]) -> bool {
+        let holds = |&[low, high]: &[[f64; 3]; 2]| {
+            (0..3).all(|axis| low[axis] <= place[axis] && place[axis] <= high[axis])
+        };
+        self.boxes.as_ref().is_some_and(|boxes| boxes.matching(holds).next().is_some())
+    }
+}
+
+/// The block of a body that stays whole; `NONE` where it does not.
+fn block_of(body: &Body, partition: &Partition, most: usize) -> u32 {
+    if body.triangles > most {
+        return NONE;
+    }
+    let CellBox { low, high } = body.place;
+    let middle: [f64; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
+    let block = partition.block_at(middle);
+    let most = partition.cell(block).body_size();
+    let small = (0..3).all(|axis| high[axis] - low[axis] <= most);
+    if small { block } else { NONE }
+}
