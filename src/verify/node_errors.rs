@@ -64,11 +64,15 @@ pub(super) fn node_errors(
         }
     }
     let measure = |(node, leaves): (u32, Vec<u32>)| {
-        let simplified = joined(&[node], geometry);
-        let original = joined(&leaves, geometry);
+        let simplified = joined(&[node], geometry, |_| true);
+        let original = joined(&leaves, geometry, |_| true);
+        // A skirt beside its plane is seen, and must be near the original; but it stands for none of it.
+        let is_skirt = &geometry[node as usize].skirts;
+        let bare =
+            joined(&[node], geometry, |triangle| is_skirt.get(triangle as usize) != Some(&true));
         let error = NodeError {
             node,
-            to_node: farthest(&original, &simplified),
+            to_node: farthest(&original, &bare),
             to_original: farthest(&simplified, &original),
         };
         progress.done(1);
@@ -77,13 +81,15 @@ pub(super) fn node_errors(
     below.into_iter().collect::<Vec<_>>().into_par_iter().map(measure).collect()
 }
 
-/// Several nodes as one surface, without their skirts.
-fn joined(nodes: &[u32], geometry: &[NodeGeometry]) -> Surface {
+/// Several nodes as one surface, without their skirts in cutting planes; of each, the triangles that count.
+fn joined(nodes: &[u32], geometry: &[NodeGeometry], counts: impl Fn(u32) -> bool) -> Surface {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     for node in nodes.iter().map(|&node| &geometry[node as usize]) {
         let first = positions.len() as u32;
         positions.extend((0..node.positions.len() as u32).map(|vertex| node.position(vertex)));
-        let surface = (0..).zip(&node.triangles).filter(|&(number, _)| node.is_surface(number));
+        let surface = (0..)
+            .zip(&node.triangles)
+            .filter(|&(number, _)| node.is_surface(number) && counts(number));
         triangles.extend(surface.map(|(_, triangle)| triangle.map(|vertex| first + vertex)));
     }
     Surface::new(positions, triangles)
