@@ -53,29 +53,29 @@ pub fn border_file(name: &str) -> String {
 pub struct Draft {
     /// Beginning of its files' names, unique in the output.
     pub name: String,
-    /// For people, and the input that it has most triangles of.
+    /// The first is a name for people, the second the input that it has most triangles of.
     pub title: [String; 2],
     /// A hash of all that it is made of.
     pub made_of: String,
-    /// What it gets of all inputs, of materials of the [`World`].
+    /// Its triangles of all inputs; their materials are those of its [`World`].
     pub parts: BlockParts,
-    /// Where it is.
+    /// This cuts triangles at the sides of its cell.
     pub cut: CellCut,
 }
 
-/// What all blocks have in common.
+/// This builds one block.
 pub struct Blocks<'a> {
-    /// Their materials.
+    /// It has the materials of the block.
     pub world: &'a World,
-    /// How nodes are made and where they go.
+    /// It says how nodes are made, and writes them.
     pub setup: &'a BlockSetup<'a>,
-    /// One lattice for all, so that blocks that touch agree on where.
+    /// All blocks have one lattice, so that blocks that touch agree on positions.
     pub lattice: Lattice,
 }
 
 impl Blocks<'_> {
-    /// Builds a block and writes its nodes and borders. Of what lies so far off that it would cost the rest
-    /// its digits it makes a block of its own. None where no triangle is left.
+    /// Builds a block and writes its nodes and borders. Triangles that lie so far off that the lattice would
+    /// become coarse for all others become a second block. The result is empty where no triangle is left.
     pub fn build(&self, draft: Draft) -> Result<Vec<BuiltBlock>> {
         let stages = self.setup.target().stages;
         let Draft { name, title, made_of, parts: BlockParts { inner, crossing }, cut } = draft;
@@ -229,7 +229,7 @@ impl Blocks<'_> {
     }
 }
 
-/// What names a block.
+/// These names and this hash identify a block.
 struct Near {
     name: String,
     title: [String; 2],
@@ -309,7 +309,7 @@ fn normal(part: &Part, corners: [u32; 3], order: [usize; 3], weights: [f64; 3]) 
     Normal::along(sum)
 }
 
-/// How the nodes of a block were made; what was imperfect in them is added to `warnings`.
+/// Counts how the nodes of a block were made, and adds what was imperfect in them to `warnings`.
 fn outcomes(trees: &[Tree<NodeRecord>], warnings: &mut Warnings) -> Vec<Count> {
     let mut steps = Vec::new();
     for tree in trees {

@@ -1,4 +1,4 @@
-//! What it takes to build nodes from a chunk of a model, of a block or of a node above blocks.
+//! Prepares building nodes from a chunk of a model: of a block, or of a node above blocks.
 
 use crate::builder::emit::disk_sink::DiskSink;
 use crate::builder::hierarchy::{BlockBuilder, HierarchyOptions, Resolutions};
@@ -47,7 +47,7 @@ impl Looks {
         Self::of(model, TexturePlan::new(model))
     }
 
-    /// Of the materials of a model whose textures are used so.
+    /// Decides for the materials of a model; `textures` says how its textures are used.
     pub fn of(model: &Model, textures: TexturePlan) -> Self {
         let is_cut_up = |material: u32| {
             let texture = textures.texture_of(material);
@@ -105,7 +105,7 @@ impl<'a> BlockSetup<'a> {
         Self { target, up, cache, extrudable, reorientable, hierarchy }
     }
 
-    /// Where nodes go.
+    /// Returns where nodes are written.
     pub fn target(&self) -> &Target<'a> {
         &self.target
     }

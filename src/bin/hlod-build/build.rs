@@ -25,7 +25,7 @@ pub struct BuildArgs {
     #[arg(value_name = "INPUT... OUT", required = true, num_args = 2..)]
     paths: Vec<PathBuf>,
 
-    /// How the city is divided into blocks, whatever its files and groups are: `auto` (cells of at most 128
+    /// Divides the city into blocks, whatever its files and groups are: `auto` (cells of at most 128
     /// times --desired-tris triangles), or `grid:METRES` (squares of METRES on the ground)
     #[arg(long, value_name = "MODE", default_value = "auto", help_heading = "Hierarchy")]
     blocks: BlockSplit,

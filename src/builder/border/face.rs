@@ -21,7 +21,7 @@ use crate::mesh::{Normal, Part, PositionKey, color_key, key, texcoord_key};
 /// A triangle that meets a side of a cell, and what it looks like.
 #[derive(Clone, Debug)]
 pub struct SideTriangle {
-    /// Where it is.
+    /// This holds its corners.
     pub triangle: Triangle,
     /// Of each corner.
     looks: [Look; 3],

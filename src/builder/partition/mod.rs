@@ -79,7 +79,7 @@ impl Cell {
 /// A cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// Where it is.
+    /// This is the space that it fills.
     pub place: CellBox,
     /// `None`: it is a block.
     pub split: Option<Split>,
