@@ -12,7 +12,7 @@ use hlod::builder::border::vertex::{self, Border};
 use hlod::builder::constants::Constants;
 use hlod::builder::error::{Below, Original, measure};
 use hlod::builder::gather::gather;
-use hlod::builder::simplify::ladder::{AppearanceWeights, Method, Simplifier, simplify};
+use hlod::builder::simplify::ladder::{AppearanceWeights, Ladder, Method, Simplifier};
 use hlod::mesh::{Mesh, UpAxis};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -58,7 +58,8 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let border = Border::interior(chunk.positions.len());
                 let target = (chunk.triangles.len() / ratio).max(8);
                 let path = vertex::Path::default();
-                let simplified = simplify(chunk, &border, &path, 0, target, &method).mesh;
+                let simplified =
+                    Ladder::new(chunk, &border, &path, 0, method).simplified(target).mesh;
                 let begin = Instant::now();
                 let below = Below::source(Original::of(chunk, constants.measure), 0.0);
                 made += begin.elapsed();

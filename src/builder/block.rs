@@ -1,6 +1,7 @@
 //! From the triangles that a block gets to its tree.
 
 use crate::Result;
+use crate::builder::block_materials::BlockMaterials;
 use crate::builder::block_setup::{BlockPlace, BlockSetup};
 use crate::builder::border::chain::KeepRule;
 use crate::builder::border::face::{FaceBorder, SideTriangle};
@@ -8,17 +9,18 @@ use crate::builder::border::mark::{Marks, mark_border};
 use crate::builder::border::record::RecordedBorder;
 use crate::builder::cut::cell::CellCut;
 use crate::builder::cut::section::Triangle;
+use crate::builder::cut::split::Chunk;
 use crate::builder::emit::disk_sink::{NodeRecord, file_name};
 use crate::builder::gather::{gather, localise};
 use crate::builder::hierarchy::{BorderMode, Forest, HierarchyOptions, LeftOut, Resolutions, Tree};
 use crate::builder::outliers::set_outliers_aside;
+use crate::builder::partition::CellBox;
 use crate::builder::scatter::BlockParts;
 use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::Stage;
 use crate::builder::stitch::{OpenEdge, stitches};
-use crate::builder::world::World;
 use crate::format::{BORDERS_DIR, BlockInfo};
-use crate::lattice::{Lattice, Quantization};
+use crate::lattice::Lattice;
 use crate::mesh::{Normal, Part, Warnings, key};
 use crate::report::build_report::{BlockReport, Count, LeftOutNode, most_frequent};
 use crate::texture::BakeReason;
@@ -49,85 +51,102 @@ pub fn border_file(name: &str) -> String {
     format!("{BORDERS_DIR}/{name}.border")
 }
 
-/// A block about to be built.
-pub struct Draft {
+/// What identifies a block.
+#[derive(Clone)]
+pub struct BlockLabel {
     /// Beginning of its files' names, unique in the output.
+    pub files: String,
+    /// A name for people.
     pub name: String,
-    /// The first is a name for people, the second the input that it has most triangles of.
-    pub title: [String; 2],
+    /// The input that it has most triangles of.
+    pub input: String,
     /// A hash of all that it is made of.
     pub made_of: String,
-    /// Its triangles of all inputs; their materials are those of its [`World`].
+}
+
+/// A block about to be built.
+pub struct Draft {
+    /// What identifies it.
+    pub label: BlockLabel,
+    /// Its triangles of all inputs; their materials are those of its [`BlockMaterials`].
     pub parts: BlockParts,
     /// This cuts triangles at the sides of its cell.
     pub cut: CellCut,
 }
 
 /// This builds one block.
-pub struct Blocks<'a> {
-    /// It has the materials of the block.
-    pub world: &'a World,
+pub struct DraftBuilder<'a> {
+    /// Those of the block.
+    pub materials: &'a BlockMaterials,
     /// It says how nodes are made, and writes them.
     pub setup: &'a BlockSetup<'a>,
     /// All blocks have one lattice, so that blocks that touch agree on positions.
     pub lattice: Lattice,
 }
 
-impl Blocks<'_> {
+/// A block's triangles as one mesh, and its borders with other blocks.
+struct Gathered {
+    chunk: Chunk<f64>,
+    border: RecordedBorder,
+    resolutions: Resolutions,
+    /// Edges that were closed by stitches.
+    stitched_edges: u64,
+}
+
+impl DraftBuilder<'_> {
     /// Builds a block and writes its nodes and borders. Triangles that lie so far off that the lattice would
     /// become coarse for all others become a second block. The result is empty where no triangle is left.
     pub fn build(&self, draft: Draft) -> Result<Vec<BuiltBlock>> {
         let stages = self.setup.target().stages;
-        let Draft { name, title, made_of, parts: BlockParts { inner, crossing }, cut } = draft;
+        let Draft { label, parts: BlockParts { inner, crossing }, cut } = draft;
         let stray = stages.time(Stage::Gather, || set_outliers_aside(&inner));
         let (inner, far) = stray.unwrap_or((inner, Vec::new()));
         let mut built = Vec::new();
-        let near = Near { name: name.clone(), title: title.clone(), made_of: made_of.clone() };
-        built.extend(self.near(near, inner, crossing, &cut)?);
+        let triangles = triangles_of(inner.iter().chain(&crossing));
+        let gathered = self.gathered(inner, crossing, &cut);
+        built.extend(self.built(label.clone(), triangles, gathered)?);
         if !far.is_empty() {
-            let [people, input] = title;
-            let title = [format!("{people} (far off)"), input];
-            let corners = || far.iter().flat_map(|part| part.positions.iter().copied());
-            let lattice = lattice_of(corners(), self.setup.target().options.quantization());
+            let places = far.iter().flat_map(|part| part.positions.iter().copied());
+            let lattice = CellBox::around(places).lattice();
+            let lattice = lattice.or_coarser(self.setup.target().options.quantization());
             let own = Self { lattice, ..*self };
-            let far_off = Near { name: format!("{name}-far"), title, made_of };
-            built.extend(own.near(far_off, far, Vec::new(), &cut)?);
+            let (files, name) =
+                (format!("{}-far", label.files), format!("{} (far off)", label.name));
+            let triangles = triangles_of(far.iter());
+            let gathered = own.gathered(far, Vec::new(), &cut);
+            built.extend(own.built(BlockLabel { files, name, ..label }, triangles, gathered)?);
         }
         Ok(built)
     }
 
-    fn near(
+    /// Cuts the triangles that cross a side, stitches what touches, and marks what lies on borders.
+    fn gathered(
         &self,
-        Near { name, title, made_of }: Near,
         mut parts: Vec<Part>,
         crossing: Vec<Part>,
         cut: &CellCut,
-    ) -> Result<Option<BuiltBlock>> {
-        let target = self.setup.target();
-        let (options, stages) = (target.options, target.stages);
+    ) -> Option<Gathered> {
+        let (materials, lattice) = (self.materials, self.lattice);
+        let (options, stages) = (self.setup.target().options, self.setup.target().stages);
         let hierarchy = &options.hierarchy;
-        let lattice = self.lattice;
-        let triangles =
-            parts.iter().chain(&crossing).map(|part| part.indices.len() as u64 / 3).sum();
         let faces = stages.time(Stage::Cut, || self.faces(&crossing, cut));
         stages.time(Stage::Cut, || {
             let pieces = crossing.iter().map(|part| piece(part, cut, lattice));
             parts.extend(pieces.filter(|part| !part.indices.is_empty()));
         });
         drop(crossing);
-        let kinds = self.world.looks.kinds(&parts);
         let goes_on = |edge: &OpenEdge| {
             let in_plane = |axis: usize, at: f64| edge.ends.iter().all(|end| end[axis] == at);
             cut.sides().iter().any(|side| in_plane(side.plane.axis, side.plane.at))
         };
-        let (chunk, stitched_edges) = stages.time(Stage::Gather, || {
+        let (mut chunk, stitched_edges) = stages.time(Stage::Gather, || {
+            let kinds = materials.looks.kinds(&parts);
             let between = stitches(&parts, kinds, &hierarchy.constants.stitch, goes_on);
-            (gather(&self.world.model.materials, &parts, &between), between.len() as u64)
+            (gather(&materials.model.materials, &parts, &between), between.len() as u64)
         });
         drop(parts);
-        let mut chunk = chunk;
         if chunk.mesh.triangles.is_empty() {
-            return Ok(None);
+            return None;
         }
         let resolutions = Resolutions::new(chunk.mesh.triangles.len(), hierarchy);
         let border = RecordedBorder::of(faces.iter());
@@ -138,11 +157,23 @@ impl Blocks<'_> {
             coarser: RANKED_STEPS as usize - resolutions.last().min(RANKED_STEPS as usize),
         };
         stages.time(Stage::Gather, || mark_border(&mut chunk, &marks));
-        drop(faces);
-        let (low, high) = match chunk.mesh.bounds() {
-            Some(bounds) => bounds,
-            None => return Ok(None),
+        Some(Gathered { chunk, border, resolutions, stitched_edges })
+    }
+
+    /// Builds and writes the nodes of a block of so many source triangles, and its borders.
+    fn built(
+        &self,
+        label: BlockLabel,
+        triangles: u64,
+        gathered: Option<Gathered>,
+    ) -> Result<Option<BuiltBlock>> {
+        let lattice = self.lattice;
+        let target = self.setup.target();
+        let (options, stages) = (target.options, target.stages);
+        let Some(Gathered { chunk, border, resolutions, stitched_edges }) = gathered else {
+            return Ok(None);
         };
+        let Some((low, high)) = chunk.mesh.bounds() else { return Ok(None) };
         let origin = lattice.origin_near(std::array::from_fn(|i| (low[i] + high[i]) * 0.5));
         let follow = options.quantization().is_some();
         let (chunk, collapsed) =
@@ -159,25 +190,25 @@ impl Blocks<'_> {
             target.progress.built(collapsed);
             return Ok(None);
         }
-        let place = BlockPlace { prefix: name.clone(), origin, lattice };
+        let BlockLabel { files, name, input, made_of } = label;
+        let place = BlockPlace { prefix: files.clone(), origin, lattice };
         let textures = self.setup.textures(&chunk.mesh, &resolutions);
         let sink = self.setup.sink(&textures, &place);
         let builder = self.setup.builder(&sink, resolutions, lattice);
         let Forest { trees, left_out } = builder.build(chunk)?;
-        target.out.write(border_file(&name), &border.to_bytes())?;
+        target.out.write(border_file(&files), &border.to_bytes())?;
         let mut left_out: Vec<LeftOutNode> = left_out
             .into_iter()
             .map(|LeftOut { child_path, triangles, kept }| LeftOutNode {
-                file: file_name(&name, &child_path),
+                file: file_name(&files, &child_path),
                 triangles,
                 kept,
             })
             .collect();
         left_out.sort_by(|a, b| a.file.cmp(&b.file));
         let outcomes = outcomes(&trees, &mut warnings);
-        let [people, input] = title;
         let report = BlockReport {
-            name,
+            name: files,
             made_of,
             triangles,
             texels: textures.used_texels(),
@@ -188,8 +219,7 @@ impl Blocks<'_> {
             warnings: Count::of_warnings(&warnings),
             texture_warnings: Vec::new(),
         };
-        let info = BlockInfo { name: people, input, origin };
-        Ok(Some(BuiltBlock { info, trees, report }))
+        Ok(Some(BuiltBlock { info: BlockInfo { name, input, origin }, trees, report }))
     }
 
     /// The borders that a block has with others.
@@ -229,28 +259,8 @@ impl Blocks<'_> {
     }
 }
 
-/// These names and this hash identify a block.
-struct Near {
-    name: String,
-    title: [String; 2],
-    made_of: String,
-}
-
-/// The lattice of what lies at these places.
-fn lattice_of(
-    positions: impl Iterator<Item = [f64; 3]>,
-    quantization: Option<Quantization>,
-) -> Lattice {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for position in positions {
-        for axis in 0..3 {
-            low[axis] = low[axis].min(position[axis]);
-            high[axis] = high[axis].max(position[axis]);
-        }
-    }
-    let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
-    let magnitude = low.into_iter().chain(high).fold(0.0, |most: f64, at| most.max(at.abs()));
-    Lattice::for_extent(extent, magnitude).or_coarser(quantization)
+fn triangles_of<'a>(parts: impl Iterator<Item = &'a Part>) -> u64 {
+    parts.map(|part| part.indices.len() as u64 / 3).sum()
 }
 
 /// The part of each triangle that is in a cell.

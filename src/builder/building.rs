@@ -1,7 +1,7 @@
 //! Building the blocks: inputs are read one after another and shared out among the blocks that they meet;
 //! a block is built when the last of its inputs is there.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -9,13 +9,14 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::Result;
-use crate::builder::block::{Blocks, BuiltBlock, Draft};
+use crate::builder::block::{BlockLabel, BuiltBlock, Draft, DraftBuilder};
+use crate::builder::block_materials::{BlockMaterials, Collecting, InputLooks};
 use crate::builder::block_setup::{BlockSetup, Target};
 use crate::builder::checkpoint::Checkpoints;
 use crate::builder::cut::cell::CellCut;
 use crate::builder::inputs::text_of;
 use crate::builder::options::BuildOptions;
-use crate::builder::partition::Others;
+use crate::builder::partition::{CellBox, Others};
 use crate::builder::plan::{KnownInput, Plan, PlannedBlock};
 use crate::builder::prepare::{Prepared, Preparing};
 use crate::builder::progress::Progress;
@@ -23,15 +24,15 @@ use crate::builder::reuse::Earlier;
 use crate::builder::scatter::{BlockParts, scatter};
 use crate::builder::stages::{Stage, Stages};
 use crate::builder::threads::in_parallel;
-use crate::builder::world::{Collecting, InputLooks, World};
 use crate::format::{OutputDir, SharedTexture};
 use crate::lattice::Quantization;
+use crate::mesh::box_tree::BoxTree;
 use crate::report::build_report::Count;
 use crate::texture::{Announced, DecodedImages, SharedTextures, TextureCache};
 
 /// What has come of blocks.
 #[derive(Default)]
-pub struct Made {
+pub struct BuiltBlocks {
     /// By cell, those of each in their order.
     pub blocks: BTreeMap<u32, Vec<BuiltBlock>>,
     /// Shared textures of earlier results, by name.
@@ -61,17 +62,18 @@ pub struct Building<'a> {
 }
 
 /// A block whose inputs are not all there yet.
-#[derive(Default)]
-struct Waiting {
-    /// By input.
+struct Waiting<'a> {
+    block: &'a PlannedBlock,
+    /// What it has of each input that is there, by the number of the input.
     parts: BTreeMap<usize, (Arc<InputLooks>, BlockParts)>,
+    /// So many inputs are not there yet.
     left: usize,
 }
 
 /// A block that can be built.
 struct Ready<'a> {
     draft: Draft,
-    world: World,
+    materials: BlockMaterials,
     announced: Announced<'a>,
 }
 
@@ -84,10 +86,12 @@ impl Building<'_> {
         mut inputs: Vec<KnownInput>,
         mut kept: BTreeMap<usize, Prepared>,
         checkpoints: &mut Checkpoints,
-    ) -> Result<(Made, Vec<KnownInput>)> {
-        let mut made = Made::default();
+    ) -> Result<(BuiltBlocks, Vec<KnownInput>)> {
+        let mut made = BuiltBlocks::default();
         let mut waiting: BTreeMap<u32, Waiting> = BTreeMap::new();
+        // In the order of blocks, so that few wait at a time whatever inputs are called.
         let mut wanted: Vec<usize> = Vec::new();
+        let mut blocks_of: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
         for block in &self.plan.blocks[share] {
             if let Some(earlier) = self.earlier
                 && let Some(numbers) = earlier.blocks(&block.name, &block.made_of)
@@ -100,16 +104,22 @@ impl Building<'_> {
                 continue;
             }
             let left = block.inputs.len();
-            waiting.insert(block.cell, Waiting { parts: BTreeMap::new(), left });
-            wanted.extend(&block.inputs);
+            waiting.insert(block.cell, Waiting { block, parts: BTreeMap::new(), left });
+            for &input in &block.inputs {
+                let blocks = blocks_of.entry(input).or_default();
+                if blocks.is_empty() {
+                    wanted.push(input);
+                }
+                blocks.push(block.cell);
+            }
         }
-        // In the order of blocks, so that few wait at a time whatever inputs are called.
-        let mut seen = BTreeSet::new();
-        wanted.retain(|input| seen.insert(*input));
-        let planned: BTreeMap<u32, usize> =
-            (0..).zip(&self.plan.blocks).map(|(at, block)| (block.cell, at)).collect();
+        let places = inputs.iter().map(|input| {
+            let clusters = input.scan.clusters.iter().map(Others::around);
+            clusters.fold(CellBox::NONE, |all, one| all.and(&one)).corners()
+        });
+        let places = BoxTree::new(places.collect());
         let images = DecodedImages::default();
-        let mut ready: Vec<(usize, Waiting)> = Vec::new();
+        let mut ready: Vec<Waiting> = Vec::new();
         let mut ahead: Option<Result<Prepared>> = None;
         for (place, &input) in wanted.iter().enumerate() {
             let read = |input: usize| self.preparing.read(&self.inputs[input]);
@@ -121,26 +131,18 @@ impl Building<'_> {
                     read(input)?
                 }
             };
-            let others = self.others(input, &inputs);
+            let others = self.others(input, &inputs, &places);
             let (looks, mut parts) = self.shared_out(prepared, &mut inputs[input], &others);
-            for (cell, waits) in &mut waiting {
-                let block = &self.plan.blocks[planned[cell]];
-                if block.inputs.binary_search(&input).is_ok() {
-                    waits.left -= 1;
-                    let parts =
-                        parts.remove(cell).map(|parts| (input, (Arc::clone(&looks), parts)));
-                    waits.parts.extend(parts);
+            for cell in blocks_of.remove(&input).unwrap_or_default() {
+                let Some(waits) = waiting.get_mut(&cell) else { continue };
+                waits.left -= 1;
+                let parts = parts.remove(&cell).map(|parts| (input, (Arc::clone(&looks), parts)));
+                waits.parts.extend(parts);
+                if waits.left == 0 {
+                    ready.extend(waiting.remove(&cell));
                 }
             }
             drop((looks, parts));
-            let done: Vec<u32> = waiting
-                .iter()
-                .filter(|(_, waits)| waits.left == 0)
-                .map(|(&cell, _)| cell)
-                .collect();
-            for cell in done {
-                ready.extend(waiting.remove(&cell).map(|waits| (planned[&cell], waits)));
-            }
             let next = wanted.get(place + 1).copied();
             let next = next.filter(|next| !kept.contains_key(next) && self.fits(input, *next));
             let (built, read_ahead) = rayon::join(
@@ -156,17 +158,13 @@ impl Building<'_> {
         Ok((made, inputs))
     }
 
-    /// What other inputs have in the box around one.
-    fn others(&self, input: usize, inputs: &[KnownInput]) -> Others {
-        let [low, high] = inputs[input].scan.bounds;
-        let meets = |[other_low, other_high]: [[f64; 3]; 2]| {
-            (0..3).all(|axis| other_low[axis] <= high[axis] && low[axis] <= other_high[axis])
-        };
-        let near = (0..)
-            .zip(inputs)
-            .filter(|(number, other)| *number != input && meets(other.scan.bounds));
-        let clusters = near.flat_map(|(_, other)| &other.scan.clusters);
-        Others::new(clusters.filter(|cluster| meets(cluster.around)))
+    /// What other inputs have near one; `places` are those where each may have something.
+    fn others(&self, input: usize, inputs: &[KnownInput], places: &BoxTree) -> Others {
+        let bounds = inputs[input].scan.bounds;
+        let meets = |&[low, high]: &[[f64; 3]; 2]| bounds.meets(&CellBox { low, high });
+        let near = places.matching(meets).filter(|&other| other != input);
+        let clusters = near.flat_map(|other| &inputs[other].scan.clusters);
+        Others::new(clusters.filter(|cluster| bounds.meets(&Others::around(cluster))))
     }
 
     /// The triangles of an input by the blocks that they are of, on the lattice; what is known of the input
@@ -201,7 +199,7 @@ impl Building<'_> {
     /// Builds blocks whose inputs are there, in parallel.
     fn build(
         &self,
-        ready: Vec<(usize, Waiting)>,
+        ready: Vec<Waiting>,
         shared: &SharedTextures,
         images: &DecodedImages,
     ) -> Result<Vec<(u32, Vec<BuiltBlock>)>> {
@@ -214,19 +212,17 @@ impl Building<'_> {
         };
         let drafts: Vec<(u32, Ready)> = ready
             .into_iter()
-            .filter(|(_, waits)| !waits.parts.is_empty())
-            .map(|(number, waits)| {
-                let block = &self.plan.blocks[number];
-                (block.cell, self.ready(block, waits, images))
-            })
+            .filter(|waits| !waits.parts.is_empty())
+            .map(|waits| (waits.block.cell, self.ready(waits, images)))
             .collect();
-        in_parallel(drafts, |_, (cell, Ready { draft, world, announced })| {
-            let cache = TextureCache::new(&world.model, &world.looks.textures, &announced);
-            let setup = BlockSetup::new(target, self.plan.up, &cache, &world.looks.extrudable);
-            let blocks = Blocks { world: &world, setup: &setup, lattice: self.plan.lattice };
-            let mut built = blocks.build(draft)?;
+        in_parallel(drafts, |_, (cell, Ready { draft, materials, announced })| {
+            let cache = TextureCache::new(&materials.model, &materials.looks.textures, &announced);
+            let setup = BlockSetup::new(target, self.plan.up, &cache, &materials.looks.extrudable);
+            let builder =
+                DraftBuilder { materials: &materials, setup: &setup, lattice: self.plan.lattice };
+            let mut built = builder.build(draft)?;
             if let Some(block) = built.first_mut() {
-                let warnings = cache.warnings_of(|texture| world.input_of(texture));
+                let warnings = cache.warnings_of(|texture| materials.input_of(texture));
                 let texts = warnings.iter().map(|(text, _)| text.to_owned());
                 block.report.texture_warnings.extend(texts);
             }
@@ -235,16 +231,12 @@ impl Building<'_> {
     }
 
     /// A block with its materials.
-    fn ready<'b>(
-        &self,
-        block: &PlannedBlock,
-        waits: Waiting,
-        images: &'b DecodedImages,
-    ) -> Ready<'b> {
+    fn ready<'b>(&self, waits: Waiting, images: &'b DecodedImages) -> Ready<'b> {
+        let Waiting { block, parts: by_input, .. } = waits;
         let mut collecting = Collecting::default();
         let mut parts = BlockParts::default();
         let mut largest = (0, String::new(), String::new());
-        for (looks, mut of_input) in waits.parts.into_values() {
+        for (looks, mut of_input) in by_input.into_values() {
             let own = || of_input.inner.iter().chain(&of_input.crossing);
             let triangles: usize = own().map(|part| part.indices.len() / 3).sum();
             if triangles > largest.0 {
@@ -256,19 +248,18 @@ impl Building<'_> {
             collecting.add(&looks, of_input.inner.iter_mut().chain(of_input.crossing.iter_mut()));
             parts.add(of_input);
         }
-        let world = collecting.finish();
-        parts.inner.iter_mut().chain(&mut parts.crossing).for_each(|part| world.fold(part));
-        let materials = parts.inner.iter().chain(&parts.crossing).map(|part| part.material);
-        let announced = images.announce(&world.model, &world.looks.textures, materials);
+        let materials = collecting.finish();
+        parts.inner.iter_mut().chain(&mut parts.crossing).for_each(|part| materials.fold(part));
+        let used = parts.inner.iter().chain(&parts.crossing).map(|part| part.material);
+        let announced = images.announce(&materials.model, &materials.looks.textures, used);
         let (_, name, input) = largest;
+        let (files, made_of) = (block.name.clone(), block.made_of.clone());
         let draft = Draft {
-            name: block.name.clone(),
-            title: [name, input],
-            made_of: block.made_of.clone(),
+            label: BlockLabel { files, name, input, made_of },
             parts,
             cut: CellCut::new(&self.plan.partition, block.cell),
         };
-        Ready { draft, world, announced }
+        Ready { draft, materials, announced }
     }
 
     /// An input is read while blocks are built, unless both are large: a file's model takes about as many

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::Result;
 use crate::builder::block::BuiltBlock;
-use crate::builder::building::Made;
+use crate::builder::building::BuiltBlocks;
 use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::finish::{Blocks, baked, over_budget, scene_of};
 use crate::builder::options::BuildOptions;
@@ -35,7 +35,7 @@ impl<'a> Checkpoints<'a> {
     /// One more input is built.
     pub fn finished(
         &mut self,
-        made: &Made,
+        made: &BuiltBlocks,
         inputs: &[KnownInput],
         plan: &Plan,
         output: &OutputDir,
@@ -51,7 +51,7 @@ impl<'a> Checkpoints<'a> {
 
     fn write(
         &self,
-        made: &Made,
+        made: &BuiltBlocks,
         inputs: &[KnownInput],
         plan: &Plan,
         output: &OutputDir,

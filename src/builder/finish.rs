@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::builder::block::BuiltBlock;
 use crate::builder::block_setup::Target;
-use crate::builder::building::Made;
+use crate::builder::building::BuiltBlocks;
 use crate::builder::emit::disk_sink::{NodeRecord, check_unique};
 use crate::builder::emit::forest::{append_nodes, make_errors_monotone, set_block};
 use crate::builder::emit::shared_textures::write_textures;
@@ -57,9 +57,14 @@ pub struct Finishing<'a> {
 
 impl Finishing<'_> {
     /// Writes what belongs to no block. The output is committed by the caller.
-    pub fn finish(self, inputs: Vec<KnownInput>, plan: &Plan, made: Made) -> Result<BuildReport> {
+    pub fn finish(
+        self,
+        inputs: Vec<KnownInput>,
+        plan: &Plan,
+        made: BuiltBlocks,
+    ) -> Result<BuildReport> {
         let Self { options, output, stages, progress, earlier, parameters, subset, .. } = self;
-        let Made { blocks, reused_textures, shared } = made;
+        let BuiltBlocks { blocks, reused_textures, shared } = made;
         let mut shared_textures = write_textures(shared, reused_textures, output)?;
         let Blocks { infos, reports: blocks, trees: of_blocks } = Blocks::of(blocks);
         let mut warnings = warnings(&inputs, &blocks, plan, earlier, self.globe);

@@ -18,6 +18,7 @@
 //! - [`constants`]: what was chosen by measuring
 
 pub mod block;
+pub mod block_materials;
 pub mod block_setup;
 pub mod border;
 pub mod building;
@@ -51,7 +52,6 @@ pub mod stitch;
 pub mod subset;
 pub mod threads;
 pub mod upper;
-pub mod world;
 
 pub use options::BuildOptions;
 pub use pipeline::{Outcome, build, build_subset, merge_subsets};

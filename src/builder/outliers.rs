@@ -4,6 +4,7 @@
 //! triangle at 1e8 m would leave a city block a lattice of several metres. Such triangles become a
 //! block of their own, on a lattice of its own; nothing is lost.
 
+use crate::builder::partition::CellBox;
 use crate::mesh::Part;
 
 /// Steps over a block's extent; see [`crate::lattice`].
@@ -21,13 +22,7 @@ pub fn set_outliers_aside(parts: &[Part]) -> Option<(Vec<Part>, Vec<Part>)> {
             part.indices.as_chunks::<3>().0.iter().map(|t| t.map(|v| part.positions[v as usize]))
         })
     };
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for position in corners().flatten() {
-        for i in 0..3 {
-            low[i] = low[i].min(position[i]);
-            high[i] = high[i].max(position[i]);
-        }
-    }
+    let CellBox { mut low, mut high } = CellBox::around(corners().flatten());
     let fine = longest_side(low, high) / STEPS * STEPS_PER_EDGE;
     let (mut count, mut shorter) = (0, 0);
     for [a, b, _] in corners() {

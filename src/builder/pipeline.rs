@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::builder::building::{Building, Made};
+use crate::builder::building::{Building, BuiltBlocks};
 use crate::builder::checkpoint::Checkpoints;
 use crate::builder::copyright;
 use crate::builder::finish::Finishing;
@@ -13,6 +13,7 @@ use crate::builder::inputs::{known, look_at, text_of};
 use crate::builder::memory::total_bytes;
 use crate::builder::merge::Subsets;
 use crate::builder::options::BuildOptions;
+use crate::builder::partition::CellBox;
 use crate::builder::plan::{KnownInput, Plan};
 use crate::builder::prepare::{Prepared, Preparing};
 use crate::builder::progress::Progress;
@@ -77,7 +78,7 @@ pub fn merge_subsets(out: &Path, progress: &dyn Progress) -> Result<BuildReport>
     let globe = options.placement.globe()?;
     let inputs = subsets.inputs().to_vec();
     let plan = Plan::new(&inputs, agreed_up(&inputs), &options);
-    let mut made = Made::default();
+    let mut made = BuiltBlocks::default();
     for block in &plan.blocks {
         let Some((earlier, numbers)) = subsets.blocks(&block.name, &block.made_of) else {
             continue;
@@ -153,14 +154,10 @@ fn run(
     }
     let (inputs, kept) = look_at_all(&paths, looked, &preparing, progress)?;
     let plan = Plan::new(&inputs, agreed_up(&inputs), options);
-    if let Some(quantization) = options.quantization() {
-        let corners = inputs.iter().map(|input| input.scan.bounds);
-        let whole = corners.reduce(|[low, high], [other_low, other_high]| {
-            let least = |axis: usize| low[axis].min(other_low[axis]);
-            let most = |axis: usize| high[axis].max(other_high[axis]);
-            [std::array::from_fn(least), std::array::from_fn(most)]
-        });
-        whole.map_or(Ok(()), |whole| quantization.check_extent(whole))?;
+    if let Some(quantization) = options.quantization().filter(|_| !plan.blocks.is_empty()) {
+        let bounds = inputs.iter().map(|input| &input.scan.bounds);
+        let whole = bounds.fold(CellBox::NONE, |all, one| all.and(one));
+        quantization.check_extent(whole.longest())?;
     }
     let share = match subset {
         Some(subset) => plan.share(subset)?,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::builder::options::BuildOptions;
-use crate::builder::partition::{CellBox, Cluster, Partition, Scan};
+use crate::builder::partition::{CellBox, Others, Partition, Scan};
 use crate::builder::subset::Subset;
 use crate::lattice::Lattice;
 use crate::mesh::UpAxis;
@@ -53,19 +53,18 @@ impl Plan {
     pub fn new(inputs: &[KnownInput], up: UpAxis, options: &BuildOptions) -> Self {
         let clusters = inputs.iter().flat_map(|input| &input.scan.clusters).copied().collect();
         let partition = Partition::new(clusters, options.blocks, options.most_in_block(), up);
-        let magnitude = inputs.iter().flat_map(|input| input.scan.bounds.as_flattened());
         let magnitude =
-            magnitude.filter(|at| at.is_finite()).fold(0.0, |most: f64, at| most.max(at.abs()));
+            inputs.iter().map(|input| input.scan.bounds.magnitude()).fold(0.0, f64::max);
         let cells = partition.cells().iter();
         let extent = cells.map(|cell| cell.extent).fold(0.0, f64::max);
         let fine = Lattice::for_extent(extent, magnitude);
         let quantization = options.quantization();
         let is_coarser = quantization.is_some_and(|coarse| coarse.step < fine.step);
         let lattice = fine.or_coarser(quantization);
-        let inputs_of = inputs_of_blocks(&partition, inputs);
+        let mut surroundings = surroundings(&partition, inputs);
         let numbers = partition.blocks();
         let planned = |cell: u32| {
-            let of_cell: Vec<usize> = inputs_of.get(&cell)?.iter().copied().collect();
+            let of_cell = surroundings.remove(&cell)?;
             Some(planned(cell, of_cell, inputs, &partition, lattice, up))
         };
         let blocks = numbers.into_iter().filter_map(planned).collect();
@@ -85,80 +84,91 @@ impl Plan {
     }
 }
 
-/// The inputs that each block may have triangles of, by cell.
-fn inputs_of_blocks(
-    partition: &Partition,
-    inputs: &[KnownInput],
-) -> BTreeMap<u32, BTreeSet<usize>> {
-    // No body whose middle is in a block reaches out of it by more.
-    let reach = |cell: u32| 0.5 * partition.cell(cell).body_size();
-    let cells = 0..partition.cells().len() as u32;
-    let most = cells.map(reach).fold(0.0, f64::max);
-    let mut all: BTreeMap<u32, BTreeSet<usize>> = BTreeMap::new();
+/// What a block depends on beside its own cell.
+#[derive(Default)]
+struct Surroundings {
+    /// The blocks of which bodies may lie here: how large these are at most decides which stay whole.
+    blocks: BTreeSet<u32>,
+    /// The inputs that the block may have triangles of.
+    inputs: BTreeSet<usize>,
+    /// Those and others that may be near such a body: where it goes on in them it does not stay whole.
+    near: BTreeSet<usize>,
+}
+
+/// Of each block that has any input, by cell.
+fn surroundings(partition: &Partition, inputs: &[KnownInput]) -> BTreeMap<u32, Surroundings> {
+    let mut all: BTreeMap<u32, Surroundings> = BTreeMap::new();
+    for block in partition.blocks() {
+        let cell = partition.cell(block);
+        // A body has its middle in its block.
+        partition.blocks_meeting(&cell.place.larger(0.5 * cell.body_size()), &mut |other| {
+            all.entry(other).or_default().blocks.insert(block);
+        });
+    }
+    let body_size = |block: u32| partition.cell(block).body_size();
+    // No body that lies here in part reaches farther from here.
+    let reach: BTreeMap<u32, f64> = all
+        .iter()
+        .map(|(&block, of)| (block, of.blocks.iter().map(|&of| body_size(of)).fold(0.0, f64::max)))
+        .collect();
+    let most = reach.values().copied().fold(0.0, f64::max);
     for (input, known) in inputs.iter().enumerate() {
-        for Cluster { around: [low, high], .. } in &known.scan.clusters {
-            let around = CellBox { low: low.map(|at| at - most), high: high.map(|at| at + most) };
-            partition.blocks_meeting(&around, &mut |cell| {
-                let (place, reach) = (partition.cell(cell).place, reach(cell));
-                let meets = (0..3).all(|axis| {
-                    high[axis] + reach >= place.low[axis] && low[axis] - reach <= place.high[axis]
-                });
-                if meets {
-                    all.entry(cell).or_default().insert(input);
+        for cluster in &known.scan.clusters {
+            let may_meet = Others::around(cluster);
+            partition.blocks_meeting(&may_meet.larger(most), &mut |block| {
+                let place = partition.cell(block).place;
+                let of_block = all.entry(block).or_default();
+                if place.meets(&cluster.around.larger(0.5 * body_size(block))) {
+                    of_block.inputs.insert(input);
+                }
+                if place.meets(&may_meet.larger(reach[&block])) {
+                    of_block.near.insert(input);
                 }
             });
         }
     }
+    all.retain(|_, of| !of.inputs.is_empty());
     all
+}
+
+fn hash_of_box(hasher: &mut blake3::Hasher, place: &CellBox) {
+    for at in place.low.iter().chain(&place.high) {
+        hasher.update(&at.to_le_bytes());
+    }
 }
 
 fn planned(
     cell: u32,
-    inputs_of: Vec<usize>,
+    of_cell: Surroundings,
     inputs: &[KnownInput],
     partition: &Partition,
     lattice: Lattice,
     up: UpAxis,
 ) -> PlannedBlock {
+    let Surroundings { blocks, inputs: own, near } = of_cell;
     let place = partition.cell(cell).place;
     let mut hasher = blake3::Hasher::new();
-    let mut add = |place: &CellBox| {
-        for at in place.low.iter().chain(&place.high) {
-            hasher.update(&at.to_le_bytes());
-        }
-    };
-    add(&place);
+    hash_of_box(&mut hasher, &place);
     let name = &hasher.finalize().to_hex()[..12];
-    let stem = match inputs_of.iter().map(|&at| stem(&inputs[at])).collect::<BTreeSet<_>>() {
+    let stem = match own.iter().map(|&at| stem(&inputs[at])).collect::<BTreeSet<_>>() {
         stems if stems.len() == 1 => stems.into_iter().next().unwrap_or_default(),
         _ => "city".into(),
     };
-    let mut hasher = blake3::Hasher::new();
-    let mut add = |place: &CellBox| {
-        for at in place.low.iter().chain(&place.high) {
-            hasher.update(&at.to_le_bytes());
-        }
-    };
-    add(&place);
     for axis in 0..3 {
         for upper in [false, true] {
             if place.side(axis, upper).is_finite() {
                 for other in partition.beyond(cell, axis, upper) {
-                    add(&partition.cell(other).place);
+                    hash_of_box(&mut hasher, &partition.cell(other).place);
                 }
             }
         }
     }
     hasher.update(&lattice.step.to_le_bytes());
     hasher.update(&[u8::from(up == UpAxis::Y)]);
-    // Which bodies are small is a matter of all blocks around.
-    let extent = partition.cell(cell).extent;
-    let around =
-        CellBox { low: place.low.map(|at| at - extent), high: place.high.map(|at| at + extent) };
-    partition.blocks_meeting(&around, &mut |other| {
-        hasher.update(&partition.cell(other).body_size().to_le_bytes());
-    });
-    for &input in &inputs_of {
+    for block in blocks {
+        hasher.update(&partition.cell(block).body_size().to_le_bytes());
+    }
+    for input in near {
         let report = &inputs[input].report;
         hasher.update(report.path.as_bytes());
         for file in &report.files {
@@ -167,7 +177,8 @@ fn planned(
         }
     }
     let made_of = hasher.finalize().to_hex().to_string();
-    PlannedBlock { cell, name: format!("{stem}-{name}"), inputs: inputs_of, made_of }
+    let inputs = own.into_iter().collect();
+    PlannedBlock { cell, name: format!("{stem}-{name}"), inputs, made_of }
 }
 
 /// The name of an input for people, as file names have it.
@@ -175,4 +186,50 @@ fn stem(input: &KnownInput) -> String {
     let stem = Path::new(&input.report.path).file_stem().unwrap_or_default();
     let stem = stem.to_string_lossy().to_lowercase();
     stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).take(40).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::partition::Cluster;
+    use crate::report::build_report::FileReport;
+
+    /// An input of points, each with so many triangles.
+    fn input(name: &str, hash: &str, points: &[[f64; 2]], triangles: u32) -> KnownInput {
+        let cluster = |&[x, y]: &[f64; 2]| {
+            let around = CellBox::around([[x, y, 0.0]]);
+            Cluster { triangles, middles: around, largest: 1.0, around }
+        };
+        let bounds = CellBox::around(points.iter().map(|&[x, y]| [x, y, 0.0]));
+        let file = FileReport { path: name.into(), bytes: 7, blake3: hash.into() };
+        let report = InputReport {
+            path: name.into(),
+            files: vec![file],
+            triangles: u64::from(triangles) * points.len() as u64,
+            up: UpAxis::Z,
+            up_from: None,
+            warnings: Vec::new(),
+        };
+        KnownInput { report, scan: Scan { bounds, clusters: points.iter().map(cluster).collect() } }
+    }
+
+    #[test]
+    fn blocks_are_made_of_inputs_in_which_their_bodies_may_go_on() {
+        let mut options = BuildOptions::default();
+        options.hierarchy.desired_tris = 300;
+        // Two blocks of 64 m by 128 m beside the plane x = 0: bodies of 64 m stay whole.
+        let steps = || (0..32).map(|step| -62.0 + 4.0 * f64::from(step));
+        let ground: Vec<[f64; 2]> = steps().flat_map(|x| steps().map(move |y| [x, y])).collect();
+        let west = |x: f64, hash: &str| {
+            let inputs = [input("a", "a", &ground, 64), input("b", hash, &[[x, 0.0]], 1)];
+            let plan = Plan::new(&inputs, UpAxis::Z, &options);
+            assert_eq!(plan.blocks.len(), 2);
+            plan.blocks[0].clone()
+        };
+        for (x, is_in, is_near) in [(20.0, true, true), (40.0, false, true), (66.0, false, false)] {
+            let (block, changed) = (west(x, "b"), west(x, "c"));
+            assert_eq!(block.inputs.contains(&1), is_in, "{x}");
+            assert_eq!(block.made_of != changed.made_of, is_near, "{x}");
+        }
+    }
 }

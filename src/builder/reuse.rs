@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 
 use crate::Result;
 use crate::builder::block::{BuiltBlock, border_file};
-use crate::builder::building::Made;
+use crate::builder::building::BuiltBlocks;
 use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::hierarchy::Tree;
 use crate::builder::options::same_nodes;
@@ -139,7 +139,7 @@ impl Earlier {
         number: usize,
         cell: u32,
         output: &OutputDir,
-        made: &mut Made,
+        made: &mut BuiltBlocks,
     ) -> Result<()> {
         let mut textures = BTreeMap::new();
         let mut trees = Vec::new();

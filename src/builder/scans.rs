@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use crate::builder::partition::{Cluster, Scan};
+use crate::builder::partition::{CellBox, Cluster, Scan};
 use crate::builder::plan::KnownInput;
 use crate::format::SCANS_FILE;
 use crate::report::build_report::InputReport;
@@ -19,10 +19,10 @@ pub fn scans_to_bytes(inputs: &[KnownInput]) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend((inputs.len() as u32).to_le_bytes());
     for KnownInput { scan: Scan { bounds, clusters }, .. } in inputs {
-        bytes.extend(bounds.as_flattened().iter().flat_map(|at| at.to_le_bytes()));
+        bytes.extend(bounds.corners().as_flattened().iter().flat_map(|at| at.to_le_bytes()));
         bytes.extend((clusters.len() as u32).to_le_bytes());
-        for Cluster { triangles, low, high, largest, around } in clusters {
-            let boxes = [low, high, &around[0], &around[1]].into_iter().flatten().copied();
+        for Cluster { triangles, middles, largest, around } in clusters {
+            let boxes = [middles.corners(), around.corners()].into_iter().flatten().flatten();
             let numbers = [f64::from(*triangles), *largest].into_iter().chain(boxes);
             bytes.extend(numbers.flat_map(f64::to_le_bytes));
         }
@@ -44,8 +44,8 @@ fn scans_of(bytes: &[u8]) -> Option<Vec<Scan>> {
     let count = u32::from_le_bytes(take(rest)?);
     let mut scans = Vec::new();
     for _ in 0..count {
-        let mut bounds = [[0.0; 3]; 2];
-        for at in bounds.as_flattened_mut() {
+        let [mut low, mut high] = [[0.0; 3]; 2];
+        for at in low.iter_mut().chain(&mut high) {
             *at = f64::from_le_bytes(take(rest)?);
         }
         let count = u32::from_le_bytes(take(rest)?) as usize;
@@ -64,13 +64,12 @@ fn scans_of(bytes: &[u8]) -> Option<Vec<Scan>> {
             let corner = |number: usize| std::array::from_fn(|axis| numbers[2 + 3 * number + axis]);
             clusters.push(Cluster {
                 triangles: numbers[0] as u32,
-                low: corner(0),
-                high: corner(1),
+                middles: CellBox { low: corner(0), high: corner(1) },
                 largest: numbers[1],
-                around: [corner(2), corner(3)],
+                around: CellBox { low: corner(2), high: corner(3) },
             });
         }
-        scans.push(Scan { bounds, clusters });
+        scans.push(Scan { bounds: CellBox { low, high }, clusters });
     }
     rest.is_empty().then_some(scans)
 }
@@ -96,10 +95,10 @@ mod tests {
             up_from: None,
             warnings: Vec::new(),
         };
-        let (low, high) = ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0]);
-        let cluster =
-            Cluster { triangles: 7, low, high, largest: 0.5, around: [[0.5; 3], [7.0; 3]] };
-        let bounds = [[0.0; 3], [7.0, 8.0, f64::INFINITY]];
+        let middles = CellBox { low: [1.0, 2.0, 3.0], high: [4.0, 5.0, 6.0] };
+        let around = CellBox { low: [0.5; 3], high: [7.0; 3] };
+        let cluster = Cluster { triangles: 7, middles, largest: 0.5, around };
+        let bounds = CellBox { low: [0.0; 3], high: [7.0, 8.0, f64::INFINITY] };
         let input = |count| KnownInput {
             report: report.clone(),
             scan: Scan { bounds, clusters: vec![cluster; count] },

@@ -71,10 +71,9 @@ impl Quantization {
         Err(Error::input(&model.source, what))
     }
 
-    /// Refuses a city with fewer steps across than would leave its shape; `bounds` are its least
-    /// and greatest coordinates.
-    pub fn check_extent(&self, [low, high]: [[f64; 3]; 2]) -> Result<()> {
-        let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+    /// Refuses a city with fewer steps across than would leave its shape; `extent` is its longest
+    /// side, metres.
+    pub fn check_extent(&self, extent: f64) -> Result<()> {
         if extent / self.step >= LEAST_ACROSS {
             return Ok(());
         }
@@ -130,7 +129,7 @@ mod tests {
     #[test]
     fn cities_of_few_steps_are_refused() {
         let quantization = Quantization { step: 0.5 };
-        let across = |metres: f64| quantization.check_extent([[0.0; 3], [1.0, metres, 2.0]]);
+        let across = |metres: f64| quantization.check_extent(metres);
         across(500.0).unwrap();
         assert!(across(499.0).unwrap_err().to_string().contains("998 steps"));
     }

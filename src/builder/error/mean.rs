@@ -7,40 +7,36 @@ use crate::builder::constants::MeasureConstants;
 use crate::mesh::Mesh;
 
 /// A mesh that others are compared with.
-pub struct MeanDistance<'a> {
-    mesh: &'a Mesh,
+pub struct MeanDistance {
+    /// What others are measured to.
+    surface: Original,
+    /// From where they are measured.
+    points: Vec<Vec3>,
     constants: MeasureConstants,
-    /// What others are measured to, and from where; made when first needed.
-    surface: Option<(Original, Vec<Vec3>)>,
 }
 
-impl<'a> MeanDistance<'a> {
+impl MeanDistance {
     /// Of distances from this mesh.
-    pub fn from(mesh: &'a Mesh, constants: MeasureConstants) -> Self {
-        Self { mesh, constants, surface: None }
+    pub fn from(mesh: &Mesh, constants: MeasureConstants) -> Self {
+        let surface = Original::of_points(mesh, constants);
+        let points = surface.samples();
+        Self { surface, points, constants }
     }
 
     /// The mean distance from each of the two meshes to the other, added up, metres; infinite
     /// where one has no surface. Unlike the largest distance it tells a mesh that lost a lamp post
     /// from one that is bent all over. Once it is clear that it exceeds `limit`, some number above
     /// that.
-    pub fn to(&mut self, other: &Mesh, limit: f64) -> f64 {
-        let constants = self.constants;
-        let surface = |mesh: &Mesh| {
-            let surface = Original::of_points(mesh, constants);
-            let points = surface.samples();
-            (surface, points)
-        };
-        let (from, from_points) = self.surface.get_or_insert_with(|| surface(self.mesh));
-        let (to, to_points) = surface(other);
-        if from_points.is_empty() || to_points.is_empty() {
+    pub fn to(&self, other: &Mesh, limit: f64) -> f64 {
+        let other = Self::from(other, self.constants);
+        if self.points.is_empty() || other.points.is_empty() {
             return f64::INFINITY;
         }
-        let there = mean(from_points, &to, limit);
+        let there = mean(&self.points, &other.surface, limit);
         if there > limit {
             return there;
         }
-        there + mean(&to_points, from, limit - there)
+        there + mean(&other.points, &self.surface, limit - there)
     }
 }
 
@@ -67,7 +63,7 @@ mod tests {
         let square = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0], [0.0, 4.0, 0.0]];
         let flat = mesh(&square, &[[0, 1, 2], [0, 2, 3]]);
         let lifted = mesh(&square.map(|[x, y, _]| [x, y, 0.5]), &[[0, 1, 2], [0, 2, 3]]);
-        let mut from = MeanDistance::from(&flat, MeasureConstants::default());
+        let from = MeanDistance::from(&flat, MeasureConstants::default());
         assert!(from.to(&flat, f64::INFINITY) < 1e-6);
         let apart = from.to(&lifted, f64::INFINITY);
         assert!((apart - 1.0).abs() < 1e-6, "{apart}");

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::*;
 use crate::builder::border::vertex::{Border, Path};
 use crate::builder::constants::{Constants, MeasureConstants};
-use crate::builder::simplify::ladder::{AppearanceWeights, Method, Simplifier, simplify};
+use crate::builder::simplify::ladder::{AppearanceWeights, Ladder, Method, Simplifier};
 use crate::mesh::{Mesh, UpAxis};
 use crate::random::Random;
 
@@ -394,7 +394,8 @@ fn a_plane_of_fewer_triangles_is_at_no_distance() {
             constants: &Constants::default(),
         };
         let border = Border::interior(plane.positions.len());
-        let fewer = simplify(&plane, &border, &Path::default(), 0, target, &method).mesh;
+        let ladder = Ladder::new(&plane, &border, &Path::default(), 0, method);
+        let fewer = ladder.simplified(target).mesh;
         assert!(fewer.triangles.len() <= target.max(8));
         let measured = measure(&original, &fewer);
         assert_eq!(measured.error.bound, 0.0, "{target}: {measured:?}");

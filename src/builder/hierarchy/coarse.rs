@@ -1,6 +1,5 @@
 //! Making a coarse node: simplification, border, distance from the original.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -19,8 +18,8 @@ use crate::builder::error::{Below, Original, measure};
 use crate::builder::simplify::compact::compact;
 use crate::builder::simplify::face_colors::with_face_colors;
 use crate::builder::simplify::fallback::fallback_triangles;
-use crate::builder::simplify::ladder::{AppearanceWeights, Method, simplify};
-use crate::builder::simplify::normal_sets::weld_normals;
+use crate::builder::simplify::ladder::{AppearanceWeights, Ladder, Method};
+use crate::builder::simplify::normal_sets::{NormalSets, weld_normals};
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::builder::simplify::weld_seams::weld_seams;
 use crate::builder::stages::Stage;
@@ -70,6 +69,21 @@ struct Coarse {
     simplified: Simplified,
     spans: Vec<BorderSpan>,
     skirts: Vec<Skirt>,
+}
+
+/// What a node is simplified by.
+struct NodeLadder<'a> {
+    /// With normals of one corner welded.
+    source: Mesh,
+    /// The same with its border thinned.
+    mesh: Mesh,
+    border: Border,
+    normal_sets: Option<NormalSets>,
+    spans: Vec<BorderSpan>,
+    /// Those that its thinned border needs.
+    skirt_triangles: usize,
+    rules: SkirtRules,
+    ladder: Ladder<'a>,
 }
 
 /// How a coarse node ends.
@@ -181,9 +195,6 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
     /// source's outline.
     fn attempt(&self, source: &NodeSurface, node: &CoarseNode) -> Attempt {
         let constants = &self.options.constants.outline;
-        let simplified = |node: &CoarseNode| {
-            self.stages.time(Stage::Simplify, || self.simplify_or_bake(source, node))
-        };
         let outline = self
             .stages
             .time(Stage::Measure, || SourceOutline::of(&source.original, self.up, constants));
@@ -192,7 +203,12 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             let kept = || outline.as_ref().map_or_else(Kept::default, |o| o.kept_by(mesh));
             self.stages.time(Stage::Measure, kept)
         };
-        let (mut coarse, mut reason) = simplified(node);
+        let simplified = |ladder: &NodeLadder, budget: usize| {
+            self.stages.time(Stage::Simplify, || self.simplified(ladder, node, budget))
+        };
+        let (ladder, first, reason) =
+            self.stages.time(Stage::Simplify, || self.ladder(source, node));
+        let mut coarse = first.unwrap_or_else(|| simplified(&ladder, node.budget));
         let mut kept = kept_by(&coarse);
         let mut within_budget = None;
         let mut budget = node.budget as f64;
@@ -200,93 +216,100 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         while kept.least() < constants.least_kept && budget < most {
             budget = most.min(budget * more_triangles(kept.least(), constants));
             within_budget = within_budget.or(Some(kept));
-            (coarse, reason) = simplified(&CoarseNode { budget: budget as usize, ..*node });
+            coarse = simplified(&ladder, budget as usize);
             kept = kept_by(&coarse);
         }
         Attempt { coarse, reason, kept, within_budget }
     }
 
-    /// Simplifies within texture seams where these leave enough, else without them: the node then
-    /// needs a texture of its own, for the reason that is returned.
-    fn simplify_or_bake(
+    /// What a node is simplified by: within texture seams where these leave enough, and then the result for
+    /// its own budget; else without them. The node then needs a texture of its own, for the reason that is
+    /// returned.
+    fn ladder(
         &self,
         source: &NodeSurface,
         node: &CoarseNode,
-    ) -> (Coarse, Option<BakeReason>) {
+    ) -> (NodeLadder<'_>, Option<Coarse>, Option<BakeReason>) {
         let NodeSurface { mesh, border, spans, .. } = source;
-        let simplified = |mesh: &Mesh, border: Border, is_baked: bool| {
-            self.simplified(mesh, border, spans.clone(), node, is_baked)
+        let ladder = |mesh: &Mesh, border: Border, is_baked: bool| {
+            self.node_ladder(mesh, border, spans.clone(), node, is_baked)
         };
         let Some(plan) = self.bake else {
-            return (simplified(mesh, border.clone(), false), None);
+            return (ladder(mesh, border.clone(), false), None, None);
         };
         let mut reason = plan.always.or(source.baked.then_some(BakeReason::Below));
         if reason.is_none() {
-            let coarse = simplified(mesh, border.clone(), false);
+            let within_seams = ladder(mesh, border.clone(), false);
+            let coarse = self.simplified(&within_seams, node, node.budget);
             if coarse.simplified.step == LadderStep::Collapse {
-                return (coarse, None);
+                return (within_seams, Some(coarse), None);
             }
             reason = Some(BakeReason::Seams);
         }
         let (mesh, border) = weld_seams(mesh, border, plan.classes);
-        (simplified(&mesh, border, true), reason)
+        (ladder(&mesh, border, true), None, reason)
     }
 
-    /// The ladder's result with its border thinned, its sections capped and its skirts.
-    fn simplified(
+    fn node_ladder(
         &self,
         source: &Mesh,
         mut border: Border,
         spans: Vec<BorderSpan>,
         node: &CoarseNode,
-        baked: bool,
-    ) -> Coarse {
-        let &CoarseNode { path, resolution, budget, .. } = node;
+        is_baked: bool,
+    ) -> NodeLadder<'_> {
+        let &CoarseNode { path, resolution, .. } = node;
         let constants = &self.options.constants;
         let rules = SkirtRules::of(&self.lattice, self.quantization.is_some(), constants.border);
         let at = resolution as u8;
-        let welded = weld_normals(source, &border);
-        let (source, normal_sets) = match welded {
+        let (source, normal_sets) = match weld_normals(source, &border) {
             Some((mesh, of_mesh, sets)) => {
                 border = of_mesh;
-                (Cow::Owned(mesh), Some(sets))
+                (mesh, Some(sets))
             }
-            None => (Cow::Borrowed(source), None),
+            None => (source.clone(), None),
         };
-        let mut mesh = Mesh::clone(&source);
+        let mut mesh = source.clone();
         thin_border(&mut mesh, &mut border, path, at);
-        // Skirts count towards the budget, but may not take more than half of it.
         let spans = join_spans(spans, path, at, &mesh, &border);
         let skirt_triangles = triangles_of(&skirts(&mesh, &border, &spans, path, &rules));
-        let target = budget.saturating_sub(skirt_triangles).max(budget / 2).max(1);
-        let weights = AppearanceWeights { keep_folds: baked, ..self.options.weights };
         let method = Method {
             simplifier: self.options.simplifier,
-            weights,
+            weights: AppearanceWeights { keep_folds: is_baked, ..self.options.weights },
             up: self.up,
             reorientable: self.reorientable,
-            extrudable: self.extrudable.materials(baked),
+            extrudable: self.extrudable.materials(is_baked),
             without: self.options.without,
             constants,
         };
-        let mut result = simplify(&mesh, &border, path, at, target, &method);
+        let ladder = Ladder::new(&mesh, &border, path, at, method);
+        NodeLadder { source, mesh, border, normal_sets, spans, skirt_triangles, rules, ladder }
+    }
+
+    /// The ladder's result for a budget, with its sections capped and its skirts.
+    fn simplified(&self, with: &NodeLadder, node: &CoarseNode, budget: usize) -> Coarse {
+        let NodeLadder { source, mesh, border, normal_sets, spans, rules, ladder, .. } = with;
+        let path = node.path;
+        // Skirts count towards the budget, but may not take more than half of it.
+        let target = budget.saturating_sub(with.skirt_triangles).max(budget / 2).max(1);
+        let mut result = ladder.simplified(target);
         if self.quantization.is_some() {
             result = self.snapped(result);
         }
         if result.mesh.triangles.is_empty() {
-            result = fallback_triangles(&source, &border, FALLBACK_TRIANGLES.min(target));
+            result = fallback_triangles(source, border, FALLBACK_TRIANGLES.min(target));
         }
-        cap_sections(&mut result, &spans, path, &mesh, &border);
+        cap_sections(&mut result, spans, path, mesh, border);
         if let Some(sets) = normal_sets {
             sets.resolve(&mut result.mesh, &mut result.border);
         }
-        let mut skirts = skirts(&result.mesh, &result.border, &spans, path, &rules);
+        let mut skirts = skirts(&result.mesh, &result.border, spans, path, rules);
         if self.quantization.is_some() {
             for (position, _) in skirts.iter_mut().flat_map(|skirt| &mut skirt.corners) {
                 *position = self.lattice.nearest(*position);
             }
         }
-        Coarse { simplified: result, spans, skirts }
+        Coarse { simplified: result, spans: spans.clone(), skirts }
     }
 
     /// A simplified mesh with all its vertices on the lattice. Those on borders are there already;

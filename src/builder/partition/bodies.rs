@@ -63,10 +63,7 @@ impl Bodies {
                 let new = Body { place: own, triangles: 0, block: NONE };
                 let body = bodies.entry(sets.root(first + corners[0])).or_insert(new);
                 body.triangles += 1;
-                for axis in 0..3 {
-                    body.place.low[axis] = body.place.low[axis].min(own.low[axis]);
-                    body.place.high[axis] = body.place.high[axis].max(own.high[axis]);
-                }
+                body.place = body.place.and(&own);
             }
             first += part.positions.len() as u32;
         }
@@ -146,14 +143,14 @@ pub struct Others {
 }
 
 impl Others {
+    /// Where surfaces of other inputs may be one with those of a cluster.
+    pub fn around(cluster: &Cluster) -> CellBox {
+        cluster.around.larger(NEAR * cluster.largest)
+    }
+
     /// Of all clusters of other inputs.
     pub fn new<'a>(clusters: impl Iterator<Item = &'a Cluster>) -> Self {
-        let around = |cluster: &Cluster| {
-            let [low, high] = cluster.around;
-            let near = NEAR * cluster.largest;
-            [low.map(|at| at - near), high.map(|at| at + near)]
-        };
-        let boxes: Vec<[[f64; 3]; 2]> = clusters.map(around).collect();
+        let boxes: Vec<_> = clusters.map(|cluster| Self::around(cluster).corners()).collect();
         Self { boxes: (!boxes.is_empty()).then(|| BoxTree::new(boxes)) }
     }
 
@@ -174,10 +171,6 @@ fn block_of(body: &Body, partition: &Partition, most: usize) -> u32 {
     if body.triangles > most {
         return NONE;
     }
-    let CellBox { low, high } = body.place;
-    let middle: [f64; 3] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
-    let block = partition.block_at(middle);
-    let most = partition.cell(block).body_size();
-    let small = (0..3).all(|axis| high[axis] - low[axis] <= most);
-    if small { block } else { NONE }
+    let block = partition.block_at(body.place.middle());
+    if body.place.longest() <= partition.cell(block).body_size() { block } else { NONE }
 }

@@ -7,51 +7,15 @@
 
 mod blocks;
 mod bodies;
+mod cell_box;
 mod scan;
 
 pub use self::blocks::BlockSplit;
 pub use self::bodies::{Bodies, Others};
+pub use self::cell_box::CellBox;
 pub use self::scan::{Cluster, Scan};
 
 use crate::mesh::UpAxis;
-
-/// A box; the least and the greatest corner, infinite where nothing bounds it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CellBox {
-    /// Least coordinates.
-    pub low: [f64; 3],
-    /// Greatest coordinates.
-    pub high: [f64; 3],
-}
-
-impl CellBox {
-    /// All of space.
-    pub const ALL: Self = Self { low: [f64::NEG_INFINITY; 3], high: [f64::INFINITY; 3] };
-
-    /// Whether all of `other` is within, and touches no side.
-    pub fn holds_within(&self, other: &Self) -> bool {
-        (0..3).all(|axis| self.low[axis] < other.low[axis] && other.high[axis] < self.high[axis])
-    }
-
-    /// Whether the boxes have a place in common, if on their sides alone.
-    pub fn meets(&self, other: &Self) -> bool {
-        (0..3).all(|i| self.low[i] <= other.high[i] && other.low[i] <= self.high[i])
-    }
-
-    /// The box around corners.
-    pub fn around(corners: [[f64; 3]; 3]) -> Self {
-        let [a, b, c] = corners;
-        Self {
-            low: std::array::from_fn(|axis| a[axis].min(b[axis]).min(c[axis])),
-            high: std::array::from_fn(|axis| a[axis].max(b[axis]).max(c[axis])),
-        }
-    }
-
-    /// The coordinate of a side: the lower or the upper one across an axis.
-    pub fn side(&self, axis: usize, upper: bool) -> f64 {
-        if upper { self.high[axis] } else { self.low[axis] }
-    }
-}
 
 /// The plane that divides a cell, and the cells on either side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,8 +75,7 @@ impl Partition {
     pub fn new(mut clusters: Vec<Cluster>, split: BlockSplit, most: u64, up: UpAxis) -> Self {
         let first = Cell { place: CellBox::ALL, split: None, triangles: 0, extent: 0.0 };
         let mut partition = Self { cells: vec![first] };
-        let [low, high] = scan::centres(&clusters);
-        let whole = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+        let whole = scan::middles(&clusters).longest();
         let dividing = Dividing { split, most, up, least: whole * LEAST_SHARE };
         partition.divide(0, &mut clusters, 0, &dividing);
         partition
@@ -232,15 +195,8 @@ fn extent(clusters: &[Cluster], triangles: u64, place: &CellBox) -> f64 {
         is_few
     });
     let few = few.count();
-    let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    let [low, high] = by_size[few..].iter().fold(none, |[low, high], cluster| {
-        [
-            std::array::from_fn(|axis| low[axis].min(cluster.around[0][axis])),
-            std::array::from_fn(|axis| high[axis].max(cluster.around[1][axis])),
-        ]
-    });
-    let side = |axis: usize| high[axis].min(place.high[axis]) - low[axis].max(place.low[axis]);
-    (0..3).map(side).fold(0.0, f64::max)
+    let around = by_size[few..].iter().map(|cluster| &cluster.around);
+    around.fold(CellBox::NONE, |all, one| all.and(one)).common(place).longest()
 }
 
 /// How cells are divided.
@@ -255,8 +211,9 @@ struct Dividing {
 impl Dividing {
     /// The plane that divides clusters, if any does.
     fn plane(&self, clusters: &[Cluster], triangles: u64) -> Option<(usize, f64)> {
-        let [low, high] = scan::centres(clusters);
-        let side = |axis: usize| high[axis] - low[axis];
+        let middles = scan::middles(clusters);
+        let CellBox { low, high } = middles;
+        let side = |axis: usize| middles.length(axis);
         match self.split {
             BlockSplit::Auto => {
                 if triangles <= self.most {

@@ -1,38 +1,35 @@
 //! What is known of an input before the partition: how many triangles are where.
 
 use rustc_hash::FxHashMap;
-use serde::{Deserialize, Serialize};
 
 use super::CellBox;
 use crate::mesh::Model;
 
 /// The triangles of one cell of a grid over an input.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cluster {
     /// How many.
     pub triangles: u32,
-    /// Least coordinates of their middles.
-    pub low: [f64; 3],
-    /// Greatest coordinates of their middles.
-    pub high: [f64; 3],
+    /// The box around their middles.
+    pub middles: CellBox,
     /// The longest side of any of their boxes, metres.
     pub largest: f64,
-    /// The box around all of them: least and greatest coordinates.
-    pub around: [[f64; 3]; 2],
+    /// The box around all of them.
+    pub around: CellBox,
 }
 
 impl Cluster {
     /// The middle along an axis.
     pub fn middle(&self, axis: usize) -> f64 {
-        0.5 * (self.low[axis] + self.high[axis])
+        self.middles.middle()[axis]
     }
 }
 
 /// What is known of an input.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
-    /// The box around its vertices; the greatest corner is below the least where it has none.
-    pub bounds: [[f64; 3]; 2],
+    /// The box around its vertices.
+    pub bounds: CellBox,
     /// Its triangles, in an order of places.
     pub clusters: Vec<Cluster>,
 }
@@ -48,53 +45,32 @@ impl Scan {
                 })
             })
         };
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        let mut count = 0u64;
-        for place in boxes() {
-            count += 1;
-            for (axis, middle) in middle(&place).into_iter().enumerate() {
-                low[axis] = low[axis].min(middle);
-                high[axis] = high[axis].max(middle);
-            }
-        }
-        let longest = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+        let middles = CellBox::around(boxes().map(|place| place.middle()));
+        let (count, longest) = (boxes().count(), middles.longest());
         let across = (count as f64 / per_cluster.max(1.0)).sqrt().max(1.0);
         // A power of two, so that the grids of inputs are one.
         let side = (longest / across).max(f64::MIN_POSITIVE).log2().floor().exp2();
         let mut clusters: FxHashMap<[i64; 3], Cluster> = FxHashMap::default();
         for place in boxes() {
-            let middle = middle(&place);
+            let middle = place.middle();
             let cell = middle.map(|coordinate| (coordinate / side).floor() as i64);
-            let around = [place.low, place.high];
-            let new = Cluster { triangles: 0, low: middle, high: middle, largest: 0.0, around };
+            let middles = CellBox { low: middle, high: middle };
+            let new = Cluster { triangles: 0, middles, largest: 0.0, around: place };
             let cluster = clusters.entry(cell).or_insert(new);
             cluster.triangles = cluster.triangles.saturating_add(1);
-            for (axis, middle) in middle.into_iter().enumerate() {
-                cluster.low[axis] = cluster.low[axis].min(middle);
-                cluster.high[axis] = cluster.high[axis].max(middle);
-                cluster.largest = cluster.largest.max(place.high[axis] - place.low[axis]);
-                cluster.around[0][axis] = cluster.around[0][axis].min(place.low[axis]);
-                cluster.around[1][axis] = cluster.around[1][axis].max(place.high[axis]);
-            }
+            cluster.middles = cluster.middles.and(&middles);
+            cluster.largest = cluster.largest.max(place.longest());
+            cluster.around = cluster.around.and(&place);
         }
         let mut clusters: Vec<([i64; 3], Cluster)> = clusters.into_iter().collect();
         clusters.sort_unstable_by_key(|(cell, _)| *cell);
         let clusters = clusters.into_iter().map(|(_, cluster)| cluster).collect();
-        Self { bounds: model.bounds(), clusters }
+        let [low, high] = model.bounds();
+        Self { bounds: CellBox { low, high }, clusters }
     }
 }
 
-fn middle(place: &CellBox) -> [f64; 3] {
-    std::array::from_fn(|axis| 0.5 * (place.low[axis] + place.high[axis]))
-}
-
 /// The box around the middles of all triangles.
-pub(super) fn centres(clusters: &[Cluster]) -> [[f64; 3]; 2] {
-    let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    clusters.iter().fold(none, |[low, high], cluster| {
-        [
-            std::array::from_fn(|axis| low[axis].min(cluster.low[axis])),
-            std::array::from_fn(|axis| high[axis].max(cluster.high[axis])),
-        ]
-    })
+pub(super) fn middles(clusters: &[Cluster]) -> CellBox {
+    clusters.iter().fold(CellBox::NONE, |all, cluster| all.and(&cluster.middles))
 }

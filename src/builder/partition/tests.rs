@@ -7,7 +7,8 @@ fn city(count: usize, side: f64, at: [f64; 2], seed: u64) -> Vec<Cluster> {
     (0..count)
         .map(|_| {
             let place = [at[0] + random.between(0.0, side), at[1] + random.between(0.0, side), 3.0];
-            Cluster { triangles: 64, low: place, high: place, largest: 1.0, around: [place, place] }
+            let around = CellBox { low: place, high: place };
+            Cluster { triangles: 64, middles: around, largest: 1.0, around }
         })
         .collect()
 }
@@ -37,12 +38,13 @@ fn blocks_fit_and_fill_space_without_overlap() {
     }
     assert_eq!(in_blocks, 4000 * 64);
     for cluster in clusters {
-        let block = partition.block_at(cluster.low);
+        let block = partition.block_at(cluster.middles.low);
         let CellBox { low, high } = partition.cell(block).place;
-        assert!((0..3).all(|i| low[i] <= cluster.low[i] && cluster.low[i] < high[i]));
+        assert!(
+            (0..3).all(|i| low[i] <= cluster.middles.low[i] && cluster.middles.low[i] < high[i])
+        );
         let mut meeting = Vec::new();
-        let point = CellBox { low: cluster.low, high: cluster.low };
-        partition.blocks_meeting(&point, &mut |other| meeting.push(other));
+        partition.blocks_meeting(&cluster.middles, &mut |other| meeting.push(other));
         assert!(meeting.contains(&block));
     }
 }
@@ -68,7 +70,7 @@ fn a_change_in_one_place_moves_no_plane_elsewhere() {
     let all = city(4000, 1000.0, [0.0, 0.0], 3);
     let changed: Vec<Cluster> = all
         .iter()
-        .filter(|cluster| !(cluster.low[0] > 800.0 && cluster.low[1] > 800.0))
+        .filter(|cluster| !(cluster.middles.low[0] > 800.0 && cluster.middles.low[1] > 800.0))
         .chain(&city(100, 190.0, [805.0, 805.0], 4))
         .copied()
         .collect();
@@ -101,9 +103,8 @@ fn squares_of_a_grid_are_blocks() {
 
 #[test]
 fn places_in_one_point_are_not_divided_for_ever() {
-    let around = [[1.0; 3]; 2];
-    let [low, high] = around;
-    let point = Cluster { triangles: 1 << 20, low, high, largest: 0.5, around };
+    let around = CellBox { low: [1.0; 3], high: [1.0; 3] };
+    let point = Cluster { triangles: 1 << 20, middles: around, largest: 0.5, around };
     let partition = Partition::new(vec![point; 9], BlockSplit::Auto, 1000, UpAxis::Z);
     assert_eq!(partition.blocks().len(), 1);
     let partition = Partition::new(Vec::new(), BlockSplit::Auto, 1000, UpAxis::Z);

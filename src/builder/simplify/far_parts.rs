@@ -8,7 +8,7 @@
 
 use glam::DVec3;
 
-use super::aggregate::{Extruded, extrude};
+use super::aggregate::{Bodies, Extruded};
 use super::compact::with_triangles;
 use super::fallback::fallback_triangles;
 use super::ladder::Method;
@@ -71,7 +71,8 @@ fn stand_in(part: Mesh, border: Border, method: &Method) -> (Mesh, Border) {
         return (part, border);
     }
     let free = vec![false; part.positions.len()];
-    match extrude(&part, &free, TRIANGLES, &method.bodies()) {
+    let rules = method.bodies();
+    match Bodies::of(&part, &free, &rules).extruded(&part, TRIANGLES, &rules) {
         Some(Extruded { prisms, rest, .. }) if rest.is_empty() => {
             let border = Border::interior(prisms.positions.len());
             (prisms, border)

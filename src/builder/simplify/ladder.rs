@@ -17,12 +17,13 @@
 //!
 //! Border vertices that the level keeps are locked throughout.
 
+use std::cell::OnceCell;
 use std::cmp::Ordering;
 
 use crate::builder::border::vertex::{Border, BorderVertexState, Path};
 use crate::builder::constants::Constants;
 use crate::builder::error::MeanDistance;
-use crate::builder::simplify::aggregate::{BodyRules, Extruded, extrude, without_floors};
+use crate::builder::simplify::aggregate::{Bodies, BodyRules, Extruded, without_floors};
 use crate::builder::simplify::cluster::cluster;
 pub use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::builder::simplify::collapse::collapse;
@@ -76,123 +77,184 @@ impl Method<'_> {
     }
 }
 
-/// Simplifies `mesh`, whose border is thinned already ([`crate::builder::border::thin`]), to at most about
-/// `target` triangles as a node of `path` at `level`.
-pub fn simplify(
-    mesh: &Mesh,
-    border: &Border,
-    path: &Path,
-    level: u8,
-    target: usize,
-    method: &Method,
-) -> Simplified {
-    let &Method { simplifier, constants, .. } = method;
-    let (mesh, border) = compact(mesh, border);
-    let locked: Vec<bool> = border
-        .planes
-        .iter()
-        .zip(&border.keep)
-        .map(|(&planes, &keep)| path.state(planes, keep, level) != BorderVertexState::Free)
-        .collect();
-    let limit = (target as f64 * BUDGET_TOLERANCE) as usize;
-    if simplifier == Simplifier::Clustering {
-        return clustered(&mesh, &border, &locked, target);
+/// A mesh that is simplified, to one budget or to several: what does not depend on the budget is found
+/// once.
+pub struct Ladder<'a> {
+    source: Simplified,
+    locked: Vec<bool>,
+    method: Method<'a>,
+    bodies: OnceCell<Bodies>,
+    has_duplicate_faces: OnceCell<bool>,
+    is_one_sheet: OnceCell<bool>,
+    /// With a consistent winding, where that changes anything.
+    oriented: OnceCell<Option<Mesh>>,
+    distance: OnceCell<MeanDistance>,
+    /// From what is seen of the source, without floors, which prisms have none of.
+    distance_seen: OnceCell<MeanDistance>,
+}
+
+impl<'a> Ladder<'a> {
+    /// Of a mesh whose border is thinned already ([`crate::builder::border::thin`]), as a node of `path` at
+    /// `level`.
+    pub fn new(mesh: &Mesh, border: &Border, path: &Path, level: u8, method: Method<'a>) -> Self {
+        let (mesh, border) = compact(mesh, border);
+        let states = border.planes.iter().zip(&border.keep);
+        let locked = states
+            .map(|(&planes, &keep)| path.state(planes, keep, level) != BorderVertexState::Free)
+            .collect();
+        Self {
+            source: Simplified { mesh, border, error: 0.0, step: LadderStep::Collapse },
+            locked,
+            method,
+            bodies: OnceCell::new(),
+            has_duplicate_faces: OnceCell::new(),
+            is_one_sheet: OnceCell::new(),
+            oriented: OnceCell::new(),
+            distance: OnceCell::new(),
+            distance_seen: OnceCell::new(),
+        }
     }
-    let source = Simplified { mesh, border, error: 0.0, step: LadderStep::Collapse };
-    if source.mesh.triangles.len() <= target {
-        return source;
+
+    /// Simplifies to at most about `target` triangles.
+    pub fn simplified(&self, target: usize) -> Simplified {
+        let Self { source, locked, method, .. } = self;
+        if method.simplifier == Simplifier::Clustering {
+            return clustered(&source.mesh, &source.border, locked, target);
+        }
+        if source.mesh.triangles.len() <= target {
+            return source.clone();
+        }
+        let limit = (target as f64 * BUDGET_TOLERANCE) as usize;
+        let mut simplified = self.nearest(target, limit);
+        let reach = method.constants.simplify.far_part * target_edge(&source.mesh, target);
+        keep_far_parts(&mut simplified, source, locked, reach, limit, method);
+        simplified
     }
-    let mut simplified = nearest(&source, &locked, target, limit, method);
-    let reach = constants.simplify.far_part * target_edge(&source.mesh, target);
-    keep_far_parts(&mut simplified, &source, &locked, reach, limit, method);
-    simplified
+
+    fn tries(&self, step: LadderStep) -> bool {
+        self.method.without != Some(step)
+    }
+
+    fn collapsed(&self, mesh: &Mesh, target: usize, step: LadderStep) -> Simplified {
+        collapse(mesh, &self.source.border, &self.locked, target, step, self.method.weights)
+    }
+
+    /// The result of the ladder's steps that is nearest to the source.
+    fn nearest(&self, target: usize, limit: usize) -> Simplified {
+        let Self { source, locked, method, .. } = self;
+        let &Method { up, constants, .. } = method;
+        let mut prisms = None;
+        if let Some((extruded, is_sure)) = self.extruded(target) {
+            if is_sure && extruded.mesh.triangles.len() <= limit {
+                return extruded;
+            }
+            prisms = Some(extruded);
+        }
+        let mut best = self.collapsed(&source.mesh, target, LadderStep::Collapse);
+        if best.mesh.triangles.len() > limit && self.tries(LadderStep::Permissive) {
+            let permissive = self.collapsed(&source.mesh, target, LadderStep::Permissive);
+            if permissive.mesh.triangles.len() < best.mesh.triangles.len() {
+                best = permissive;
+            }
+        }
+        let target_edge = target_edge(&source.mesh, target);
+        let rules = &constants.simplify;
+        let has_duplicate_faces = || has_duplicate_faces(&source.mesh, rules.few_faces);
+        let is_unfit = best.mesh.triangles.len() > limit
+            || *self.has_duplicate_faces.get_or_init(has_duplicate_faces);
+        let mut candidates = Vec::new();
+        if is_unfit || best.error > rules.doubtful * target_edge {
+            // Over one sheet it does what collapse did.
+            let is_one_sheet = || is_one_sheet(&source.mesh, locked);
+            if self.tries(LadderStep::Prune) && !*self.is_one_sheet.get_or_init(is_one_sheet) {
+                candidates.push(self.collapsed(&source.mesh, target, LadderStep::Prune));
+            }
+            if self.tries(LadderStep::Clustering) {
+                candidates.push(clustered(&source.mesh, &source.border, locked, target));
+            }
+            if self.tries(LadderStep::Oriented) {
+                candidates.extend(self.collapsed_with_set_winding(target));
+            }
+        }
+        let has_prisms = prisms.is_some();
+        candidates.extend(prisms);
+        if candidates.is_empty() {
+            return best;
+        }
+        let rank = |candidate: &Simplified, best: (Rank, f64)| {
+            let nearest = if best.0 == Rank::WithinBudget { best.1 } else { f64::INFINITY };
+            let distance = || {
+                if has_prisms {
+                    let seen = || without_floors(&source.mesh, up);
+                    let from = || MeanDistance::from(&seen(), constants.measure);
+                    let from = self.distance_seen.get_or_init(from);
+                    return from.to(&without_floors(&candidate.mesh, up), nearest);
+                }
+                let from = || MeanDistance::from(&source.mesh, constants.measure);
+                self.distance.get_or_init(from).to(&candidate.mesh, nearest)
+            };
+            Rank::of(candidate.mesh.triangles.len(), limit, distance, target_edge)
+        };
+        let mut best = (rank(&best, (Rank::OverBudgetSevere, f64::INFINITY)), best);
+        for candidate in candidates {
+            let rank = rank(&candidate, best.0);
+            if !candidate.mesh.triangles.is_empty()
+                && rank.partial_cmp(&best.0) == Some(Ordering::Less)
+            {
+                best = (rank, candidate);
+            }
+        }
+        best.1
+    }
+
+    /// Extruded bodies with the rest simplified by edge collapse, and whether there are so few triangles for
+    /// each body that nothing else is worth a try.
+    fn extruded(&self, target: usize) -> Option<(Simplified, bool)> {
+        let Self { source, locked, method, .. } = self;
+        if !self.tries(LadderStep::Prisms) {
+            return None;
+        }
+        let rules = method.bodies();
+        let bodies = self.bodies.get_or_init(|| Bodies::of(&source.mesh, locked, &rules));
+        let Extruded { prisms, rest, triangles_per_body } =
+            bodies.extruded(&source.mesh, target, &rules)?;
+        let step = LadderStep::Prisms;
+        let for_rest = target.saturating_sub(prisms.triangles.len()).max(1);
+        let rest = Mesh { triangles: rest.to_vec(), ..source.mesh.clone() };
+        let mut result = if rest.triangles.len() > for_rest {
+            // Nothing is left out here: that is for small bodies, which are prisms.
+            self.collapsed(&rest, for_rest, step)
+        } else {
+            let (mesh, border) = compact(&rest, &source.border);
+            Simplified { mesh, border, error: 0.0, step }
+        };
+        let border = Border::interior(prisms.positions.len());
+        result.append(prisms, border);
+        Some((result, triangles_per_body < method.constants.prisms.sure))
+    }
+
+    /// Edge collapse after duplicate faces are removed and all have a consistent winding; `None` where this
+    /// changes nothing.
+    fn collapsed_with_set_winding(&self, target: usize) -> Option<Simplified> {
+        let Self { source, method, .. } = self;
+        let few = method.constants.simplify.few_faces;
+        let oriented = || {
+            let triangles = oriented(&source.mesh, method.reorientable, few)?;
+            Some(Mesh { triangles, ..source.mesh.clone() })
+        };
+        let mesh = self.oriented.get_or_init(oriented).as_ref()?;
+        let step = LadderStep::Oriented;
+        if mesh.triangles.len() > target {
+            return Some(self.collapsed(mesh, target, step));
+        }
+        let (mesh, border) = compact(mesh, &source.border);
+        Some(Simplified { mesh, border, error: 0.0, step })
+    }
 }
 
 /// The side, in metres, of a square with the mean area of a triangle of the target.
 fn target_edge(mesh: &Mesh, target: usize) -> f64 {
     (mesh.area() / target as f64).sqrt()
-}
-
-/// The result of the ladder's steps that is nearest to the source.
-fn nearest(
-    source: &Simplified,
-    locked: &[bool],
-    target: usize,
-    limit: usize,
-    method: &Method,
-) -> Simplified {
-    let &Method { weights, up, reorientable, without, constants, .. } = method;
-    let tries = |step| without != Some(step);
-    let collapsed = |step| collapse(&source.mesh, &source.border, locked, target, step, weights);
-    let mut prisms = None;
-    if tries(LadderStep::Prisms)
-        && let Some(extruded) = extrude(&source.mesh, locked, target, &method.bodies())
-    {
-        let is_sure = extruded.triangles_per_body < constants.prisms.sure;
-        let completed = completed(source, extruded, locked, target, weights);
-        if is_sure && completed.mesh.triangles.len() <= limit {
-            return completed;
-        }
-        prisms = Some(completed);
-    }
-    let mut best = collapsed(LadderStep::Collapse);
-    if best.mesh.triangles.len() > limit && tries(LadderStep::Permissive) {
-        let permissive = collapsed(LadderStep::Permissive);
-        if permissive.mesh.triangles.len() < best.mesh.triangles.len() {
-            best = permissive;
-        }
-    }
-    let mut candidates = Vec::new();
-    let target_edge = target_edge(&source.mesh, target);
-    let rules = &constants.simplify;
-    let is_unfit =
-        best.mesh.triangles.len() > limit || has_duplicate_faces(&source.mesh, rules.few_faces);
-    if is_unfit || best.error > rules.doubtful * target_edge {
-        // Over one sheet it does what collapse did.
-        if tries(LadderStep::Prune) && !is_one_sheet(&source.mesh, locked) {
-            candidates.push(collapsed(LadderStep::Prune));
-        }
-        if tries(LadderStep::Clustering) {
-            candidates.push(clustered(&source.mesh, &source.border, locked, target));
-        }
-        if tries(LadderStep::Oriented) {
-            let few = rules.few_faces;
-            candidates.extend(collapsed_with_set_winding(
-                source,
-                locked,
-                target,
-                weights,
-                reorientable,
-                few,
-            ));
-        }
-    }
-    // Prisms have no floors; these are left out of the comparison.
-    let seen = |mesh: &Mesh| without_floors(mesh, up);
-    let has_prisms = prisms.is_some();
-    candidates.extend(prisms);
-    if candidates.is_empty() {
-        return best;
-    }
-    let source_seen = if has_prisms { &seen(&source.mesh) } else { &source.mesh };
-    let mut from_source = MeanDistance::from(source_seen, constants.measure);
-    let mut rank = |candidate: &Simplified, best: (Rank, f64)| {
-        let nearest = if best.0 == Rank::WithinBudget { best.1 } else { f64::INFINITY };
-        let distance = || match has_prisms {
-            true => from_source.to(&seen(&candidate.mesh), nearest),
-            false => from_source.to(&candidate.mesh, nearest),
-        };
-        Rank::of(candidate.mesh.triangles.len(), limit, distance, target_edge)
-    };
-    let mut best = (rank(&best, (Rank::OverBudgetSevere, f64::INFINITY)), best);
-    for candidate in candidates {
-        let rank = rank(&candidate, best.0);
-        if !candidate.mesh.triangles.is_empty() && rank.partial_cmp(&best.0) == Some(Ordering::Less)
-        {
-            best = (rank, candidate);
-        }
-    }
-    best.1
 }
 
 /// The ranks of candidates, the best first.
@@ -228,50 +290,6 @@ impl Rank {
             (_, false) => (Self::Distant, distance),
         }
     }
-}
-
-/// Edge collapse after duplicate faces are removed and all have a consistent winding; `None` where this
-/// changes nothing.
-fn collapsed_with_set_winding(
-    source: &Simplified,
-    locked: &[bool],
-    target: usize,
-    weights: AppearanceWeights,
-    reorientable: &[bool],
-    few: f64,
-) -> Option<Simplified> {
-    let triangles = oriented(&source.mesh, reorientable, few)?;
-    let mesh = Mesh { triangles, ..source.mesh.clone() };
-    let step = LadderStep::Oriented;
-    if mesh.triangles.len() > target {
-        return Some(collapse(&mesh, &source.border, locked, target, step, weights));
-    }
-    let (mesh, border) = compact(&mesh, &source.border);
-    Some(Simplified { mesh, border, error: 0.0, step })
-}
-
-/// Extruded components, with the rest simplified by edge collapse.
-fn completed(
-    source: &Simplified,
-    extruded: Extruded,
-    locked: &[bool],
-    target: usize,
-    weights: AppearanceWeights,
-) -> Simplified {
-    let Extruded { prisms, rest, .. } = extruded;
-    let step = LadderStep::Prisms;
-    let for_rest = target.saturating_sub(prisms.triangles.len()).max(1);
-    let rest = Mesh { triangles: rest, ..source.mesh.clone() };
-    let mut result = if rest.triangles.len() > for_rest {
-        // Nothing is left out here: that is for small bodies, which are prisms.
-        collapse(&rest, &source.border, locked, for_rest, step, weights)
-    } else {
-        let (mesh, border) = compact(&rest, &source.border);
-        Simplified { mesh, border, error: 0.0, step }
-    };
-    let border = Border::interior(prisms.positions.len());
-    result.append(prisms, border);
-    result
 }
 
 fn clustered(mesh: &Mesh, border: &Border, locked: &[bool], target: usize) -> Simplified {
@@ -337,7 +355,7 @@ mod tests {
                 without: None,
                 constants,
             };
-            simplify(&mesh, &border, &Path::default(), 0, target, &method)
+            Ladder::new(&mesh, &border, &Path::default(), 0, method).simplified(target)
         };
         let few = simplified(600);
         assert_eq!(few.step, LadderStep::Prisms);

@@ -28,7 +28,7 @@ use crate::builder::folding::merge_untextured;
 use crate::builder::gather::{gather, localise};
 use crate::builder::hierarchy::{BorderMode, MemberSurfaces, Resolutions, Tree};
 use crate::builder::options::BuildOptions;
-use crate::builder::partition::{Partition, Split};
+use crate::builder::partition::{CellBox, Partition, Split};
 use crate::builder::reuse::Earlier;
 use crate::builder::stages::Stage;
 use crate::builder::stitch::{OpenEdge, stitches};
@@ -37,9 +37,6 @@ use crate::lattice::Lattice;
 use crate::mesh::{PositionKey, UpAxis, Warnings, key};
 use crate::report::build_report::UpperReport;
 use crate::texture::{DecodedImages, SharedTextures, TextureCache};
-
-/// Nodes above blocks are made until no more than this are at the top.
-const MOST_ROOTS: usize = 8;
 
 /// A node has at most about so many times the children that a node of a block has: members of few
 /// triangles each would otherwise make nodes that are replaced by very many at once.
@@ -124,8 +121,8 @@ impl UpperBuilder<'_> {
                 Built { trees: [below.trees, above.trees].concat(), border }
             }
         };
-        let is_enough = cell.split.is_some() && self.is_enough(&trees);
-        if is_enough || number == 0 && trees.len() > MOST_ROOTS {
+        // One node at the top, whatever it has below.
+        if trees.len() > 1 && (number == 0 || self.is_enough(&trees)) {
             trees = self.node(number, trees, &border, gathered)?;
         }
         Ok(Built { trees, border })
@@ -154,8 +151,7 @@ impl UpperBuilder<'_> {
             (u64::from(hierarchy.desired_tris), u64::from(hierarchy.level_factor));
         let triangles: u64 =
             trees.iter().map(|tree| u64::from(tree.record.attributes.triangles)).sum();
-        trees.len() > 1
-            && (triangles >= budget * factor || trees.len() >= MOST_MEMBERS * factor as usize)
+        triangles >= budget * factor || trees.len() >= MOST_MEMBERS * factor as usize
     }
 
     /// A node above the trees of a cell; the trees themselves where it would keep too little of them.
@@ -268,16 +264,9 @@ impl UpperBuilder<'_> {
 
     /// That of the blocks, or a coarser one where a node is larger.
     fn lattice_of(&self, members: &[Tree<NodeRecord>]) -> Lattice {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for Tree { record, .. } in members {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(record.attributes.bbox_min[axis]);
-                high[axis] = high[axis].max(record.attributes.bbox_max[axis]);
-            }
-        }
-        let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
-        let magnitude = low.into_iter().chain(high).fold(0.0, |most: f64, at| most.max(at.abs()));
-        Lattice::for_extent(extent, magnitude).coarser(self.lattice)
+        let bounds = members.iter().map(|tree| &tree.record.attributes);
+        let corners = bounds.flat_map(|node| [node.bbox_min, node.bbox_max]);
+        CellBox::around(corners).lattice().coarser(self.lattice)
     }
 
     /// As at planes within blocks: triangles go to a share and the length of borders to its root.

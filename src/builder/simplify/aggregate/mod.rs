@@ -14,9 +14,11 @@ mod floors;
 mod look;
 mod prisms;
 
+use std::cell::OnceCell;
+
 pub use self::extrudable::Extrudable;
 pub use self::floors::without_floors;
-use self::prisms::{Body, prisms};
+use self::prisms::{Body, Footprints};
 use crate::builder::constants::PrismConstants;
 use crate::builder::simplify::parts::{Part, parts};
 use crate::mesh::{Coordinate, Mesh, UpAxis};
@@ -35,7 +37,7 @@ pub struct BodyRules<'a> {
 
 impl BodyRules<'_> {
     /// A part of a mesh as a body, if it is one.
-    fn body<'a, C: Coordinate>(&self, mesh: &Mesh<C>, part: &'a Part) -> Option<Body<'a>> {
+    fn body<C: Coordinate>(&self, mesh: &Mesh<C>, part: &Part) -> Option<Body> {
         let may = |&triangle: &[u32; 3]| {
             let material = mesh.triangle_material(triangle) as usize;
             self.extrudable.get(material).copied().unwrap_or_default()
@@ -59,11 +61,11 @@ impl BodyRules<'_> {
 }
 
 /// A mesh whose bodies are prisms.
-pub struct Extruded {
+pub struct Extruded<'a> {
     /// These.
     pub prisms: Mesh,
     /// The triangles of the mesh that they do not stand for.
-    pub rest: Vec<[u32; 3]>,
+    pub rest: &'a [[u32; 3]],
     /// How many triangles there are for each body that they stand for.
     pub triangles_per_body: f64,
 }
@@ -77,39 +79,55 @@ pub fn has_many_bodies(mesh: &Mesh, target: usize, rules: &BodyRules) -> bool {
 /// Prisms are made of so many triangles at least: those of a box, without its floor.
 const LEAST_TRIANGLES: usize = 10;
 
-/// Replaces the bodies of a `mesh` by prisms, so that about `target` triangles are left
-/// for all if the rest is simplified too; `None` where there are too few bodies to be worth it, or
-/// these have too many borders for so few triangles. Nothing that has a `locked` vertex is replaced.
-pub fn extrude(mesh: &Mesh, locked: &[bool], target: usize, rules: &BodyRules) -> Option<Extruded> {
-    let &BodyRules { up, constants, .. } = rules;
-    if !rules.any() {
-        return None;
-    }
-    let (mut bodies, mut rest) = (Vec::new(), Vec::new());
-    let parts = parts(mesh);
-    let (mut in_bodies, mut area) = (0.0, 0.0);
-    for part in &parts {
-        area += part.area;
-        let is_free = || !part.triangles.iter().flatten().any(|&vertex| locked[vertex as usize]);
-        let body = is_free().then(|| rules.body(mesh, part)).flatten();
-        match body {
-            Some(body) => {
-                in_bodies += part.area;
-                bodies.push(body);
+/// The bodies of a mesh, which prisms may stand for.
+pub struct Bodies {
+    bodies: Vec<(Part, Body)>,
+    /// The triangles that are of no body.
+    rest: Vec<[u32; 3]>,
+    /// The share of the mesh's area that bodies have.
+    share: f64,
+    /// Made for the first budget.
+    footprints: OnceCell<Option<Footprints>>,
+}
+
+impl Bodies {
+    /// Those of a mesh; nothing that has a `locked` vertex is one.
+    pub fn of(mesh: &Mesh, locked: &[bool], rules: &BodyRules) -> Self {
+        let (mut bodies, mut rest) = (Vec::new(), Vec::new());
+        let (mut in_bodies, mut area) = (0.0, 0.0);
+        let parts = if rules.any() { parts(mesh) } else { Vec::new() };
+        for part in parts {
+            area += part.area;
+            let is_free = !part.triangles.iter().flatten().any(|&vertex| locked[vertex as usize]);
+            match is_free.then(|| rules.body(mesh, &part)).flatten() {
+                Some(body) => {
+                    in_bodies += part.area;
+                    bodies.push((part, body));
+                }
+                None => rest.extend_from_slice(&part.triangles),
             }
-            None => rest.extend_from_slice(&part.triangles),
         }
+        Self { bodies, rest, share: in_bodies / area, footprints: OnceCell::new() }
     }
-    if bodies.len() * constants.triangles_per_body <= target {
-        return None;
+
+    /// Replaces all of them by prisms, so that about `target` triangles are left for the whole mesh, by
+    /// the same rules, if the rest is simplified too; `None` where there are too few bodies to be worth it,
+    /// or these have too many borders for so few triangles. Further budgets use the grid of the first.
+    pub fn extruded(&self, mesh: &Mesh, target: usize, rules: &BodyRules) -> Option<Extruded<'_>> {
+        let Self { bodies, rest, share, footprints } = self;
+        let &BodyRules { up, constants, .. } = rules;
+        if bodies.len() * constants.triangles_per_body <= target {
+            return None;
+        }
+        // What the rest does not need is there for bodies.
+        let for_bodies = (target as f64 * share).max(target as f64 - rest.len() as f64);
+        let triangles_per_body = for_bodies / bodies.len() as f64;
+        let most = (for_bodies as usize).max(LEAST_TRIANGLES);
+        let made = || Footprints::of(mesh, bodies, up, most, constants);
+        let footprints = footprints.get_or_init(made).as_ref()?;
+        let prisms = footprints.prisms(mesh, bodies, up, most, constants)?;
+        Some(Extruded { prisms, rest, triangles_per_body })
     }
-    let share = target as f64 * in_bodies / area;
-    // What the rest does not need is there for bodies.
-    let for_bodies = share.max(target as f64 - rest.len() as f64);
-    let triangles_per_body = for_bodies / bodies.len() as f64;
-    let most = (for_bodies as usize).max(LEAST_TRIANGLES);
-    let prisms = prisms(mesh, &bodies, up, most, constants)?;
-    Some(Extruded { prisms, rest, triangles_per_body })
 }
 
 #[cfg(test)]
@@ -151,10 +169,12 @@ mod tests {
         let mesh = town();
         let mut constants = PrismConstants { cells: 1 << 18, ..PrismConstants::default() };
         let free = vec![false; mesh.positions.len()];
-        // With 6 triangles for each house rows are joined over gaps of 6 m, which are filled.
-        for (target, most) in [(600, 1.5), (1200, 1.03)] {
-            let Extruded { prisms, rest, .. } =
-                extrude(&mesh, &free, target, &rules(&constants)).unwrap();
+        // With 6 triangles for each house rows are joined over gaps of 6 m, which are filled; with 13 each
+        // has its own box.
+        for (target, most) in [(600, 1.5), (1300, 1.03)] {
+            let rules = rules(&constants);
+            let bodies = Bodies::of(&mesh, &free, &rules);
+            let Extruded { prisms, rest, .. } = bodies.extruded(&mesh, target, &rules).unwrap();
             assert_eq!(rest.len(), 1, "the ground");
             let count = prisms.triangles.len();
             assert!(count > target / 2 && count <= target + target / 10, "{count}");
@@ -183,17 +203,21 @@ mod tests {
         }
         let mut textured = mesh.clone();
         textured.texcoords = vec![[0.5; 2]; mesh.positions.len()];
-        let baked = extrude(&textured, &free, 600, &rules(&constants)).unwrap().prisms;
+        let all = rules(&constants);
+        let textured_bodies = Bodies::of(&textured, &free, &all);
+        let baked = textured_bodies.extruded(&textured, 600, &all).unwrap().prisms;
         assert_eq!(baked.texcoords.len(), baked.positions.len());
-        let kept = BodyRules { extrudable: &[false], ..rules(&constants) };
-        assert!(extrude(&textured, &free, 600, &kept).is_none());
-        assert_eq!((rules(&constants).count(&textured), kept.count(&textured)), (100, 0));
+        let kept = BodyRules { extrudable: &[false], ..all };
+        assert!(Bodies::of(&textured, &free, &kept).extruded(&textured, 600, &kept).is_none());
+        assert_eq!((all.count(&textured), kept.count(&textured)), (100, 0));
         let mut locked = free.clone();
         locked[0] = true;
-        let kept = extrude(&mesh, &locked, 600, &rules(&constants)).unwrap().rest;
-        assert_eq!(kept.len(), 1 + 14);
-        assert!(extrude(&mesh, &free, 2000, &rules(&constants)).is_none(), "enough for all");
+        let kept = Bodies::of(&mesh, &locked, &all);
+        assert_eq!(kept.extruded(&mesh, 600, &all).unwrap().rest.len(), 1 + 14);
+        let free_bodies = Bodies::of(&mesh, &free, &all);
+        assert!(free_bodies.extruded(&mesh, 2000, &all).is_none(), "enough for all");
         constants.cells = 0;
-        assert!(extrude(&mesh, &free, 600, &rules(&constants)).is_none());
+        let none = rules(&constants);
+        assert!(Bodies::of(&mesh, &free, &none).extruded(&mesh, 600, &none).is_none());
     }
 }

@@ -7,19 +7,18 @@ use crate::builder::simplify::aggregate::look::{Look, LookSum};
 use crate::mesh::{Coordinate, Mesh, UpAxis, wide};
 
 /// A separate body with walls and roofs, whichever way its faces wind.
-pub(in super::super) struct Body<'a> {
-    pub triangles: &'a [[u32; 3]],
+pub(in super::super) struct Body {
     /// What it covers of the ground, about, square metres.
     pub footprint: f64,
     pub roof: Look,
     pub wall: Look,
 }
 
-impl<'a> Body<'a> {
+impl Body {
     /// `None` for what is flat, or has hardly any walls.
     pub fn of<C: Coordinate>(
         mesh: &Mesh<C>,
-        triangles: &'a [[u32; 3]],
+        triangles: &[[u32; 3]],
         up: UpAxis,
         constants: &PrismConstants,
     ) -> Option<Self> {
@@ -54,6 +53,6 @@ impl<'a> Body<'a> {
         let size: DVec2 = (high - low).truncate();
         let is_body = height > constants.least_height * footprint.sqrt()
             && walls >= constants.least_walls * 2.0 * size.element_sum() * height;
-        is_body.then_some(Self { triangles, footprint, roof, wall })
+        is_body.then_some(Self { footprint, roof, wall })
     }
 }

@@ -101,6 +101,9 @@ impl Heights {
             return;
         }
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        // Metres for each column and row.
+        let [at_a, at_b, at_c] = corners.map(|corner| corner.z);
+        let rise = ((b - a) * (at_c - at_a) - (c - a) * (at_b - at_a)).perp() / twice;
         // Rows and columns whose centres are within.
         let span = |low: f64, high: f64, most: usize| {
             let end = ((high + 0.5).floor().max(0.0) as usize).min(most);
@@ -121,9 +124,7 @@ impl Heights {
             }
             for column in span(left, right, self.grid.columns) {
                 let p = glam::dvec2(column as f64 + 0.5, y);
-                let (v, w) = ((p - a).perp_dot(c - a) / twice, (b - a).perp_dot(p - a) / twice);
-                let [at_a, at_b, at_c] = corners.map(|corner| corner.z);
-                let height = (at_a + (at_b - at_a) * v + (at_c - at_a) * w) as f32;
+                let height = (at_a + rise.dot(p - a)) as f32;
                 let cell = row * self.grid.columns + column;
                 self.low[cell] = self.low[cell].min(height);
                 if height > self.top[cell] {

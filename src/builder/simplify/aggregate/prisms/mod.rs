@@ -2,8 +2,7 @@
 //!
 //! Bodies are seen from above, as heights over a grid ([`heights`]); regions of one height are
 //! merged with neighbours and with gaps between them, or given up ([`regions`]), and their borders
-//! get fewer points ([`outlines`]), all by the volume that changes. Of several numbers of regions
-//! that is taken which changes least for the triangles that there are. A region is a flat roof, and
+//! get fewer points ([`outlines`]), all by the volume that changes. A region is a flat roof, and
 //! where two meet is a wall; there are no floors, which nobody sees.
 
 mod arcs;
@@ -26,22 +25,45 @@ use self::outlines::Outlines;
 use self::regions::{Labels, Regions};
 use super::look::Look;
 use crate::builder::constants::PrismConstants;
+use crate::builder::simplify::parts::Part;
 use crate::mesh::{Mesh, Normal, UpAxis, wide};
 
-/// Prisms with at most about `target` triangles for the bodies.
-pub(super) fn prisms(
-    mesh: &Mesh,
-    bodies: &[Body],
-    up: UpAxis,
-    target: usize,
-    constants: &PrismConstants,
-) -> Option<Mesh> {
-    let heights = seen_from_above(mesh, bodies, up, target, constants)?;
-    let share = share(bodies, target);
-    let gap = constants.gap * share / heights.grid.side;
-    let regions = Regions::of(&heights, gap, constants);
-    let tried = |triangles_each: f64| {
-        let count = regions.count().min((target as f64 / triangles_each) as usize).max(1);
+/// The bodies of a mesh as regions of a grid, from which prisms are made for one budget or several.
+pub(super) struct Footprints {
+    heights: Heights,
+    regions: Regions,
+}
+
+impl Footprints {
+    /// Bodies with their triangles, by a grid that is fine enough for prisms of about `target` triangles;
+    /// `None` where they have no extent.
+    pub fn of(
+        mesh: &Mesh,
+        bodies: &[(Part, Body)],
+        up: UpAxis,
+        target: usize,
+        constants: &PrismConstants,
+    ) -> Option<Self> {
+        let footprint: f64 = bodies.iter().map(|(_, body)| body.footprint).sum();
+        // The side of a square as large as the footprints have for each triangle.
+        let share = (footprint / target as f64).sqrt();
+        let heights = seen_from_above(mesh, bodies, up, share, constants)?;
+        let gap = constants.gap * share / heights.grid.side;
+        let regions = Regions::of(&heights, gap, constants);
+        Some(Self { heights, regions })
+    }
+
+    /// Prisms with at most about `target` triangles; `None` where borders have too many arcs for so few.
+    pub fn prisms(
+        &self,
+        mesh: &Mesh,
+        bodies: &[(Part, Body)],
+        up: UpAxis,
+        target: usize,
+        constants: &PrismConstants,
+    ) -> Option<Mesh> {
+        let Self { heights, regions } = self;
+        let count = regions.count().min((target as f64 / TRIANGLES_EACH) as usize).max(1);
         let least = (constants.crumb * constants.resolution * constants.resolution) as usize;
         let labels = regions.down_to(count, least);
         let arcs = arcs(&labels.of_cell, &regions.near, &heights.grid);
@@ -58,45 +80,30 @@ pub(super) fn prisms(
         // A ring of n corners is n − 2 triangles.
         let corners = target + 2 * labels.regions.len();
         outlines.simplify(corners);
-        // What has too many arcs cannot have few triangles.
         let over = outlines.triangles().saturating_sub(corners) as f64 / target as f64;
-        let change = if over > MOST_OVER { f64::INFINITY } else { labels.change + outlines.change };
-        (change, (labels, arcs, outlines))
-    };
-    let tried = TRIANGLES_EACH.map(tried);
-    let (change, (labels, arcs, outlines)) =
-        tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    if change == f64::INFINITY {
-        return None;
+        let walls = Walls { mesh, bodies, up, heights, labels: &labels };
+        (over <= MOST_OVER).then(|| walls.built(&arcs, &outlines))
     }
-    Some(Walls { mesh, bodies, up, heights: &heights, labels: &labels }.built(&arcs, &outlines))
 }
 
-/// Triangles for a region on average, of which the better is taken: by one that is a half more the
-/// change is hardly less, and what has too few regions loses much. A box without a floor has ten.
-const TRIANGLES_EACH: [f64; 2] = [8.0, 12.5];
+/// Triangles for a region on average: a box without a floor has ten, and many regions are larger
+/// than a box.
+const TRIANGLES_EACH: f64 = 12.5;
 
 /// Prisms may have this share of their triangles more.
 const MOST_OVER: f64 = 0.03;
 
-/// The side of a square as large as the footprints have for each triangle, metres.
-fn share(bodies: &[Body], target: usize) -> f64 {
-    let footprint: f64 = bodies.iter().map(|body| body.footprint).sum();
-    (footprint / target as f64).sqrt()
-}
-
 fn seen_from_above(
     mesh: &Mesh,
-    bodies: &[Body],
+    bodies: &[(Part, Body)],
     up: UpAxis,
-    target: usize,
+    share: f64,
     constants: &PrismConstants,
 ) -> Option<Heights> {
     let at = |vertex: &u32| up.z_up(wide(mesh.positions[*vertex as usize]));
-    let all = || bodies.iter().flat_map(|body| body.triangles.as_flattened());
+    let all = || bodies.iter().flat_map(|(part, _)| part.triangles.as_flattened());
     let low = all().fold(DVec2::INFINITY, |low, vertex| low.min(at(vertex).truncate()));
     let high = all().fold(DVec2::NEG_INFINITY, |high, vertex| high.max(at(vertex).truncate()));
-    let share = share(bodies, target);
     let size = (high - low).max(DVec2::splat(share));
     let least = (size.x * size.y / constants.cells as f64).sqrt();
     let side = (share / constants.resolution).max(least);
@@ -106,8 +113,8 @@ fn seen_from_above(
     // Wider than what is near bodies ([`heights::Near`]).
     let margin = (constants.gap * share / side).ceil() as usize + 2;
     let mut heights = Heights::none(Grid::over(low, high, side, margin), bodies.len());
-    for (number, body) in (0..).zip(bodies) {
-        for triangle in body.triangles {
+    for (number, (part, _)) in (0..).zip(bodies) {
+        for triangle in &part.triangles {
             heights.add(number, [0, 1, 2].map(|corner| at(&triangle[corner])));
         }
     }
@@ -117,7 +124,7 @@ fn seen_from_above(
 /// What prisms are made from.
 struct Walls<'a> {
     mesh: &'a Mesh,
-    bodies: &'a [Body<'a>],
+    bodies: &'a [(Part, Body)],
     up: UpAxis,
     heights: &'a Heights,
     labels: &'a Labels,
@@ -157,7 +164,7 @@ impl Walls<'_> {
     }
 
     /// Each region looks like the body that covers most of it.
-    fn looks(&self) -> FxHashMap<u32, &Body<'_>> {
+    fn looks(&self) -> FxHashMap<u32, &Body> {
         let mut cells: FxHashMap<(u32, u32), usize> = FxHashMap::default();
         for (&region, &body) in self.labels.of_cell.iter().zip(&self.heights.body) {
             if region != NONE && body != NONE {
@@ -169,7 +176,9 @@ impl Walls<'_> {
             let known = most.entry(region).or_default();
             *known = (*known).max((count, body));
         }
-        most.into_iter().map(|(region, (_, body))| (region, &self.bodies[body as usize])).collect()
+        most.into_iter()
+            .map(|(region, (_, body))| (region, &self.bodies[body as usize].1))
+            .collect()
     }
 
     fn push(&self, result: &mut Mesh, corner: DVec2, height: f64, look: &Look) -> u32 {
@@ -220,7 +229,7 @@ impl Walls<'_> {
         sides: [Option<u32>; 2],
         is_closed: bool,
         points: &[DVec2],
-        looks: &FxHashMap<u32, &Body<'_>>,
+        looks: &FxHashMap<u32, &Body>,
     ) {
         let height = |side: Option<u32>| side.map(|region| self.labels.regions[&region].height);
         let faces_right = height(sides[0]) >= height(sides[1]);

@@ -130,7 +130,7 @@ pub(super) struct Regions {
     first: Vec<Sums>,
     /// See [`PrismConstants`].
     raise: f64,
-    mergings: Vec<(Merging, f64)>,
+    mergings: Vec<Merging>,
 }
 
 /// Cells with their regions after some mergings.
@@ -139,8 +139,6 @@ pub(super) struct Labels {
     pub of_cell: Vec<u32>,
     /// Of each region that is left, by its number.
     pub regions: BTreeMap<u32, Region>,
-    /// What merging has changed: metres of height times cells.
-    pub change: f64,
 }
 
 /// A region that is left.
@@ -190,9 +188,7 @@ impl Regions {
         let mut joined = DisjointSet::new(self.count());
         let mut open = vec![false; self.count()];
         let mut sums = self.first.clone();
-        let mut change = 0.0;
-        for &(merging, changed) in &self.mergings[..done] {
-            change += changed;
+        for &merging in &self.mergings[..done] {
             match merging {
                 Merging::Regions(into, region) => {
                     sums[into as usize] = sums[into as usize].and(&sums[region as usize]);
@@ -227,7 +223,7 @@ impl Regions {
             (region, Region { height: mean + self.raise * deviation, low })
         };
         let regions = left.map(region).collect();
-        Labels { of_cell, regions, change }
+        Labels { of_cell, regions }
     }
 }
 
@@ -267,7 +263,7 @@ struct Merger {
     outer: Vec<f64>,
     versions: Vec<u32>,
     offers: BinaryHeap<Reverse<Offer>>,
-    done: Vec<(Merging, f64)>,
+    done: Vec<Merging>,
 }
 
 impl Merger {
@@ -319,7 +315,7 @@ impl Merger {
         }
     }
 
-    fn run(mut self) -> Vec<(Merging, f64)> {
+    fn run(mut self) -> Vec<Merging> {
         for region in 0..self.sums.len() as u32 {
             self.offer(region, |other| other < region);
         }
@@ -361,7 +357,7 @@ impl Merger {
     fn merge(&mut self, first: u32, second: u32) {
         let Some(sums) = self.sums[first as usize] else { return };
         if first == second {
-            self.done.push((Merging::Open(first), self.net * sums.volume()));
+            self.done.push(Merging::Open(first));
             self.sums[first as usize] = None;
             self.versions[first as usize] = u32::MAX;
             let around: Vec<u32> = self.contacts[first as usize].keys().copied().collect();
@@ -376,7 +372,7 @@ impl Merger {
         }
         let Some(others) = self.sums[second as usize] else { return };
         let contact = self.contacts[first as usize].remove(&second).unwrap_or_default();
-        self.done.push((Merging::Regions(first, second), changed(&sums, &others, &contact)));
+        self.done.push(Merging::Regions(first, second));
         let both = with_gap(&sums, &others, &contact);
         self.sums[first as usize] = Some(both);
         self.sums[second as usize] = None;
@@ -466,13 +462,12 @@ mod tests {
         ]);
         let regions = Regions::of(&heights, 4.0, &constants());
         assert_eq!(regions.count(), 5);
-        let Labels { of_cell, regions, change } = regions.down_to(2, 4);
+        let Labels { of_cell, regions } = regions.down_to(2, 4);
         let found: Vec<f64> = regions.values().map(|region| region.height).collect();
         assert_eq!(found.len(), 2);
         // The mean of 6, 6.5 and 6, and half of their standard deviation.
         let row = 18.5 / 3.0 + 0.5 * (1.0f64 / 18.0).sqrt();
         assert!((found[0] - row).abs() < 1e-6 && (found[1] - 50.0).abs() < 1e-6, "{found:?}");
-        assert!(change > 0.0);
         // The gaps of a metre between houses are filled: 26 m by 10 m.
         let cells = of_cell.iter().filter(|&&region| Some(&region) == regions.keys().next());
         assert_eq!(cells.count(), 4 * 26 * 10);
@@ -500,8 +495,10 @@ mod tests {
         let heights = seen(&[([2.0, 2.0, 10.0, 12.0], 6.0), ([10.0, 2.0, 19.0, 12.0], 6.0)]);
         let regions = Regions::of(&heights, 4.0, &constants());
         let all = regions.down_to(usize::MAX, 4);
-        assert_eq!((all.regions.len(), all.change), (2, 0.0));
-        // Of one height, and touching: one at no cost.
-        assert_eq!(regions.down_to(1, 4).change, 0.0);
+        assert_eq!(all.of_cell, regions.of_cell);
+        // Of one height, and touching: one that has the cells of both.
+        let one = regions.down_to(1, 4);
+        let covered = |labels: &Labels| labels.of_cell.iter().filter(|&&of| of != NONE).count();
+        assert_eq!((one.regions.len(), covered(&one)), (1, covered(&all)));
     }
 }

@@ -96,7 +96,7 @@ impl Collecting {
     }
 
     /// All that there are.
-    pub fn finish(mut self) -> World {
+    pub fn finish(mut self) -> BlockMaterials {
         let folding = Folding::new(&mut self.materials, &self.is_used);
         let count = self.textures.len();
         let mut usage = self.usage;
@@ -112,13 +112,13 @@ impl Collecting {
             warnings: Warnings::default(),
         };
         let looks = Looks::of(&model, TexturePlan::of_usage(&model, usage));
-        World { model, looks, folding, inputs: self.inputs }
+        BlockMaterials { model, looks, folding, inputs: self.inputs }
     }
 }
 
 /// The materials and textures of a block.
 #[derive(Debug)]
-pub struct World {
+pub struct BlockMaterials {
     /// Without triangles.
     pub model: Model,
     /// How its materials may be treated.
@@ -127,7 +127,7 @@ pub struct World {
     inputs: Vec<PathBuf>,
 }
 
-impl World {
+impl BlockMaterials {
     /// Gives a part what its material has become.
     pub fn fold(&self, part: &mut Part) {
         self.folding.apply(part);
