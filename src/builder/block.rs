@@ -4,10 +4,11 @@ use crate::Result;
 use crate::builder::block_materials::BlockMaterials;
 use crate::builder::block_setup::{BlockPlace, BlockSetup};
 use crate::builder::border::chain::KeepRule;
-use crate::builder::border::face::{FaceBorder, SideTriangle};
-use crate::builder::border::mark::{Marks, mark_border};
-use crate::builder::border::record::RecordedBorder;
+use crate::builder::built::{BuiltBlock, border_file};
 use crate::builder::cut::cell::CellCut;
+use crate::builder::cut::face::{FaceBorder, SideTriangle};
+use crate::builder::cut::mark::{Marks, mark_border};
+use crate::builder::cut::record::RecordedBorder;
 use crate::builder::cut::section::Triangle;
 use crate::builder::cut::split::Chunk;
 use crate::builder::emit::disk_sink::{NodeRecord, file_name};
@@ -19,7 +20,7 @@ use crate::builder::scatter::BlockParts;
 use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::Stage;
 use crate::builder::stitch::{OpenEdge, stitches};
-use crate::format::{BORDERS_DIR, BlockInfo};
+use crate::format::BlockInfo;
 use crate::lattice::Lattice;
 use crate::mesh::{Normal, Part, Warnings, key};
 use crate::report::build_report::{BlockReport, Count, LeftOutNode, most_frequent};
@@ -27,29 +28,6 @@ use crate::texture::BakeReason;
 
 /// Steps of simplification that borders between blocks are ranked for.
 const RANKED_STEPS: u32 = 8;
-
-/// A block whose nodes are written.
-#[derive(Clone, Debug)]
-pub struct BuiltBlock {
-    /// For `scene.hlod`.
-    pub info: BlockInfo,
-    /// Its nodes: one tree, or several where roots are left out.
-    pub trees: Vec<Tree<NodeRecord>>,
-    /// For `build.json`.
-    pub report: BlockReport,
-}
-
-impl BuiltBlock {
-    /// Visits all records, parents first.
-    pub fn for_each<'a>(&'a self, visit: &mut impl FnMut(&'a NodeRecord)) {
-        self.trees.iter().for_each(|tree| tree.for_each(visit));
-    }
-}
-
-/// The file of the borders of a block, inside an output folder.
-pub fn border_file(name: &str) -> String {
-    format!("{BORDERS_DIR}/{name}.border")
-}
 
 /// What identifies a block.
 #[derive(Clone)]

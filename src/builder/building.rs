@@ -9,9 +9,10 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::Result;
-use crate::builder::block::{BlockLabel, BuiltBlock, Draft, DraftBuilder};
+use crate::builder::block::{BlockLabel, Draft, DraftBuilder};
 use crate::builder::block_materials::{BlockMaterials, Collecting, InputLooks};
 use crate::builder::block_setup::{BlockSetup, Target};
+use crate::builder::built::{BuiltBlock, BuiltBlocks};
 use crate::builder::checkpoint::Checkpoints;
 use crate::builder::cut::cell::CellCut;
 use crate::builder::inputs::text_of;
@@ -24,22 +25,11 @@ use crate::builder::reuse::Earlier;
 use crate::builder::scatter::{BlockParts, scatter};
 use crate::builder::stages::{Stage, Stages};
 use crate::builder::threads::in_parallel;
-use crate::format::{OutputDir, SharedTexture};
+use crate::format::OutputDir;
 use crate::lattice::Quantization;
 use crate::mesh::box_tree::BoxTree;
 use crate::report::build_report::Count;
 use crate::texture::{Announced, DecodedImages, SharedTextures, TextureCache};
-
-/// What has come of blocks.
-#[derive(Default)]
-pub struct BuiltBlocks {
-    /// By cell, those of each in their order.
-    pub blocks: BTreeMap<u32, Vec<BuiltBlock>>,
-    /// Shared textures of earlier results, by name.
-    pub reused_textures: BTreeMap<String, SharedTexture>,
-    /// Those of this build.
-    pub shared: SharedTextures,
-}
 
 /// What building blocks takes.
 pub struct Building<'a> {

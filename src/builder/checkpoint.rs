@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use crate::Result;
-use crate::builder::block::BuiltBlock;
-use crate::builder::building::BuiltBlocks;
+use crate::builder::built::BuiltBlock;
+use crate::builder::built::BuiltBlocks;
 use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::finish::{Blocks, baked, over_budget, scene_of};
 use crate::builder::options::BuildOptions;

@@ -39,13 +39,16 @@ pub struct Constants {
 pub struct BlockConstants {
     /// Blocks have at most so many budgets, 1 or more (the thesis's have 87 on average).
     pub divided: usize,
+    /// And at most so many texels of the source, where these are spread evenly over the triangles that
+    /// have them: all of its images are in memory at once.
+    pub texels: u64,
     /// A separate body with at most the triangles of a block divided by this is not cut, 1 or more.
     pub uncut: usize,
 }
 
 impl Default for BlockConstants {
     fn default() -> Self {
-        Self { divided: 128, uncut: 32 }
+        Self { divided: 128, texels: 1 << 26, uncut: 32 }
     }
 }
 

@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
-use crate::builder::block::BuiltBlock;
 use crate::builder::block_setup::Target;
-use crate::builder::building::BuiltBlocks;
+use crate::builder::built::BuiltBlock;
+use crate::builder::built::BuiltBlocks;
 use crate::builder::emit::disk_sink::{NodeRecord, check_unique};
 use crate::builder::emit::forest::{append_nodes, make_errors_monotone, set_block};
 use crate::builder::emit::shared_textures::write_textures;

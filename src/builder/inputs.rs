@@ -10,11 +10,10 @@ use crate::builder::plan::KnownInput;
 use crate::builder::prepare::{Prepared, Preparing};
 use crate::builder::progress::Progress;
 use crate::builder::reuse::Earlier;
-use crate::builder::sources::Sources;
+use crate::builder::sources::{Sources, unchanged};
 use crate::builder::stages::{Stage, Stages};
-use crate::format::check_regular;
+use crate::decode::texture_size;
 use crate::report::build_report::{Count, FileReport, InputReport};
-use crate::stage_timer::StageTimer;
 
 /// Sizes and hashes of the files of an input.
 fn describe(
@@ -24,17 +23,6 @@ fn describe(
 ) -> Result<Vec<FileReport>> {
     let describe = |path: &PathBuf| stages.time(Stage::Compare, || sources.report(path));
     dependencies.par_iter().map(describe).collect()
-}
-
-/// True where every file of an input is as it was.
-pub fn unchanged(earlier: &InputReport, sources: &Sources) -> bool {
-    let timer = StageTimer::current();
-    let is_same = |file: &FileReport| {
-        let path = Path::new(&file.path);
-        let size = check_regular(path).map_or(0, |metadata| metadata.len());
-        size == file.bytes && sources.report(path).is_ok_and(|now| now == *file)
-    };
-    !earlier.files.is_empty() && earlier.files.par_iter().all(|file| timer.time(|| is_same(file)))
 }
 
 /// What an earlier result knows of an input that has not changed.
@@ -56,7 +44,14 @@ pub fn look_at(
     progress.found(triangles);
     let per_cluster = preparing.options.most_in_block() as f64 / CLUSTERS;
     let (scan, files) = rayon::join(
-        || preparing.stages.time(Stage::Gather, || Scan::of(model, per_cluster)),
+        || {
+            // One that cannot be read is missing, and warned of, when its block is built.
+            let size = |texture| texture_size(texture).unwrap_or_default();
+            let texels = model.textures.iter().map(size);
+            let texels: Vec<u64> =
+                texels.map(|(width, height)| u64::from(width) * u64::from(height)).collect();
+            preparing.stages.time(Stage::Gather, || Scan::of(model, &texels, per_cluster))
+        },
         || describe(&model.dependencies, preparing.sources, preparing.stages),
     );
     let report = InputReport {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::builder::plan::KnownInput;
 use crate::builder::reuse::Earlier;
-use crate::builder::subset::Subset;
+use crate::format::Subset;
 use crate::format::{REPORT_FILE, SUBSETS_DIR};
 use crate::report::build_report::BuildReport;
 use crate::{Error, Result};

@@ -1,27 +1,34 @@
 //! From imported models to nodes on disk.
 //!
-//! - [`pipeline`]: the whole build; [`mod@prepare`]: an input as it is built; [`inputs`]: looking at it
-//! - [`sources`]: what is read as one input: files, and tiles of large ones
-//! - [`partition`]: one tree of cells over all inputs; [`plan`]: what each block is made of
-//! - [`building`]: inputs one after another, blocks when their inputs are there; [`scatter`], [`block`]
-//! - [`upper`]: nodes above the blocks, made from the files below them
-//! - [`mod@finish`]: scene, tileset and report
-//! - [`reuse`]: blocks of an earlier result; [`subset`] and [`merge`]: shares for several machines
-//! - [`copyright`]: notices of the inputs, which every node repeats
-//! - [`stitch`]: borders of the source that touch without sharing vertices
-//! - [`hierarchy`]: the tree of one block
-//! - [`cut`]: planes, and the triangles that cross them
-//! - [`border`]: what planes leave behind: thinning, skirts, caps
-//! - [`simplify`]: bringing a node to its triangle budget
-//! - [`error`]: the distance between a node and the original
-//! - [`emit`]: nodes as files
-//! - [`constants`]: what was chosen by measuring
+//! Layers: a module uses those of the layers above it in this list alone, which a test checks.
+//!
+//! 1. [`constants`]: what was chosen by measuring; [`partition`]: one tree of cells over all inputs;
+//!    [`folding`]: untextured materials as vertex colours; [`copyright`]: notices of inputs;
+//!    [`progress`], [`stages`], [`memory`], [`threads`]: where time and memory go
+//! 2. [`border`]: what planes leave behind, thinned alike on both sides, and skirts; [`error`]: the
+//!    distance between a node and the source; [`stitch`]: borders that touch without sharing vertices;
+//!    [`scatter`]: the triangles of an input by block; [`outliers`]: what is far off
+//! 3. [`simplify`]: bringing a node to its triangle budget; [`cut`]: planes, and triangles that cross them
+//! 4. [`hierarchy`]: the tree of one block; [`gather`]: its triangles as one mesh
+//! 5. [`emit`]: nodes as files; [`options`]
+//! 6. [`plan`]: what each block is made of; [`block_setup`]: how its nodes are made; [`built`]: what they
+//!    come to
+//! 7. [`block_materials`]: those of all inputs of a block; [`scans`]: what is known of inputs, on disk
+//! 8. [`block`]: from its triangles to its nodes; [`reuse`]: what is taken over from an earlier result
+//! 9. [`sources`]: files, and tiles of large ones; [`upper`]: nodes above blocks, from the files below
+//! 10. [`mod@prepare`]: an input as it is built
+//! 11. [`inputs`]: looking at them; [`merge`]: shares of several machines
+//! 12. [`mod@finish`]: scene, tileset and report
+//! 13. `checkpoint`: what a build that is stopped leaves behind
+//! 14. [`building`]: inputs one after another, and blocks when their inputs are there
+//! 15. [`pipeline`]: the whole
 
 pub mod block;
 pub mod block_materials;
 pub mod block_setup;
 pub mod border;
 pub mod building;
+pub mod built;
 mod checkpoint;
 pub mod constants;
 pub mod copyright;
@@ -49,10 +56,9 @@ pub mod simplify;
 pub mod sources;
 pub mod stages;
 pub mod stitch;
-pub mod subset;
 pub mod threads;
 pub mod upper;
 
+pub use crate::format::Subset;
 pub use options::BuildOptions;
 pub use pipeline::{Outcome, build, build_subset, merge_subsets};
-pub use subset::Subset;

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::builder::building::{Building, BuiltBlocks};
+use crate::builder::building::Building;
+use crate::builder::built::BuiltBlocks;
 use crate::builder::checkpoint::Checkpoints;
 use crate::builder::copyright;
 use crate::builder::finish::Finishing;
@@ -20,7 +21,7 @@ use crate::builder::progress::Progress;
 use crate::builder::reuse::Earlier;
 use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
-use crate::builder::subset::Subset;
+use crate::format::Subset;
 use crate::format::{OutputDir, SUBSETS_DIR, Unfinished, check_apart};
 use crate::mesh::UpAxis;
 use crate::report::build_report::{BuildReport, SubsetReport};

@@ -5,8 +5,8 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::builder::options::BuildOptions;
-use crate::builder::partition::{CellBox, Others, Partition, Scan};
-use crate::builder::subset::Subset;
+use crate::builder::partition::{CellBox, Most, Others, Partition, Scan};
+use crate::format::Subset;
 use crate::lattice::Lattice;
 use crate::mesh::UpAxis;
 use crate::report::build_report::InputReport;
@@ -51,8 +51,10 @@ pub struct Plan {
 impl Plan {
     /// For inputs of which everything is known.
     pub fn new(inputs: &[KnownInput], up: UpAxis, options: &BuildOptions) -> Self {
+        let texels = options.hierarchy.constants.blocks.texels as f64;
+        let most = Most { triangles: options.most_in_block(), texels };
         let clusters = inputs.iter().flat_map(|input| &input.scan.clusters).copied().collect();
-        let partition = Partition::new(clusters, options.blocks, options.most_in_block(), up);
+        let partition = Partition::new(clusters, options.blocks, most, up);
         let magnitude =
             inputs.iter().map(|input| input.scan.bounds.magnitude()).fold(0.0, f64::max);
         let cells = partition.cells().iter();
@@ -198,7 +200,7 @@ mod tests {
     fn input(name: &str, hash: &str, points: &[[f64; 2]], triangles: u32) -> KnownInput {
         let cluster = |&[x, y]: &[f64; 2]| {
             let around = CellBox::around([[x, y, 0.0]]);
-            Cluster { triangles, middles: around, largest: 1.0, around }
+            Cluster { triangles, texels: 0.0, middles: around, largest: 1.0, around }
         };
         let bounds = CellBox::around(points.iter().map(|&[x, y]| [x, y, 0.0]));
         let file = FileReport { path: name.into(), bytes: 7, blake3: hash.into() };
@@ -217,7 +219,7 @@ mod tests {
     fn blocks_are_made_of_inputs_in_which_their_bodies_may_go_on() {
         let mut options = BuildOptions::default();
         options.hierarchy.desired_tris = 300;
-        // Two blocks of 64 m by 128 m beside the plane x = 0: bodies of 64 m stay whole.
+        // Two blocks of 62 m by 124 m beside the plane x = 0: bodies of 32 m stay whole.
         let steps = || (0..32).map(|step| -62.0 + 4.0 * f64::from(step));
         let ground: Vec<[f64; 2]> = steps().flat_map(|x| steps().map(move |y| [x, y])).collect();
         let west = |x: f64, hash: &str| {
@@ -226,7 +228,7 @@ mod tests {
             assert_eq!(plan.blocks.len(), 2);
             plan.blocks[0].clone()
         };
-        for (x, is_in, is_near) in [(20.0, true, true), (40.0, false, true), (66.0, false, false)] {
+        for (x, is_in, is_near) in [(10.0, true, true), (20.0, false, true), (40.0, false, false)] {
             let (block, changed) = (west(x, "b"), west(x, "c"));
             assert_eq!(block.inputs.contains(&1), is_in, "{x}");
             assert_eq!(block.made_of != changed.made_of, is_near, "{x}");

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use crate::Result;
-use crate::builder::block::{BuiltBlock, border_file};
-use crate::builder::building::BuiltBlocks;
+use crate::builder::built::BuiltBlocks;
+use crate::builder::built::{BuiltBlock, border_file};
 use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::hierarchy::Tree;
 use crate::builder::options::same_nodes;

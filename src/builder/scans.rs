@@ -9,10 +9,10 @@ use crate::format::SCANS_FILE;
 use crate::report::build_report::InputReport;
 
 /// What such a file begins with; the last byte is the version.
-const MAGIC: &[u8; 8] = b"hlodscn\x01";
+const MAGIC: &[u8; 8] = b"hlodscn\x02";
 
 /// Numbers of a cluster.
-const NUMBERS: usize = 14;
+const NUMBERS: usize = 15;
 
 /// As a file has it, little-endian; in the order of the inputs of its report.
 pub fn scans_to_bytes(inputs: &[KnownInput]) -> Vec<u8> {
@@ -21,9 +21,9 @@ pub fn scans_to_bytes(inputs: &[KnownInput]) -> Vec<u8> {
     for KnownInput { scan: Scan { bounds, clusters }, .. } in inputs {
         bytes.extend(bounds.corners().as_flattened().iter().flat_map(|at| at.to_le_bytes()));
         bytes.extend((clusters.len() as u32).to_le_bytes());
-        for Cluster { triangles, middles, largest, around } in clusters {
+        for Cluster { triangles, texels, middles, largest, around } in clusters {
             let boxes = [middles.corners(), around.corners()].into_iter().flatten().flatten();
-            let numbers = [f64::from(*triangles), *largest].into_iter().chain(boxes);
+            let numbers = [f64::from(*triangles), *texels, *largest].into_iter().chain(boxes);
             bytes.extend(numbers.flat_map(f64::to_le_bytes));
         }
     }
@@ -61,11 +61,12 @@ fn scans_of(bytes: &[u8]) -> Option<Vec<Scan>> {
                     return None;
                 }
             }
-            let corner = |number: usize| std::array::from_fn(|axis| numbers[2 + 3 * number + axis]);
+            let corner = |number: usize| std::array::from_fn(|axis| numbers[3 + 3 * number + axis]);
             clusters.push(Cluster {
                 triangles: numbers[0] as u32,
+                texels: numbers[1],
                 middles: CellBox { low: corner(0), high: corner(1) },
-                largest: numbers[1],
+                largest: numbers[2],
                 around: CellBox { low: corner(2), high: corner(3) },
             });
         }
@@ -97,7 +98,7 @@ mod tests {
         };
         let middles = CellBox { low: [1.0, 2.0, 3.0], high: [4.0, 5.0, 6.0] };
         let around = CellBox { low: [0.5; 3], high: [7.0; 3] };
-        let cluster = Cluster { triangles: 7, middles, largest: 0.5, around };
+        let cluster = Cluster { triangles: 7, texels: 9.5, middles, largest: 0.5, around };
         let bounds = CellBox { low: [0.0; 3], high: [7.0, 8.0, f64::INFINITY] };
         let input = |count| KnownInput {
             report: report.clone(),

@@ -4,13 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use crate::builder::inputs::unchanged;
+use rayon::prelude::*;
+
 use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
 use crate::builder::reuse::Earlier;
+use crate::format::check_regular;
 use crate::import::tiling::{TILE_VERTICES, Tiling, is_divided};
 use crate::mesh::{Model, UpAxis};
 use crate::report::build_report::{FileReport, InputReport};
+use crate::stage_timer::StageTimer;
 use crate::{Result, import};
 
 /// Where inputs are read from.
@@ -128,4 +131,14 @@ impl Sources {
 fn paths(known: &InputReport) -> impl Iterator<Item = &Path> {
     let path = Path::new(&known.path);
     [Some(path), path.parent()].into_iter().flatten()
+}
+/// True where every file of an input is as it was.
+pub fn unchanged(earlier: &InputReport, sources: &Sources) -> bool {
+    let timer = StageTimer::current();
+    let is_same = |file: &FileReport| {
+        let path = Path::new(&file.path);
+        let size = check_regular(path).map_or(0, |metadata| metadata.len());
+        size == file.bytes && sources.report(path).is_ok_and(|now| now == *file)
+    };
+    !earlier.files.is_empty() && earlier.files.par_iter().all(|file| timer.time(|| is_same(file)))
 }

@@ -41,6 +41,7 @@ mod scene_read;
 mod scene_tests;
 mod scene_write;
 mod sink;
+mod subset;
 #[cfg(test)]
 mod test_mesh;
 #[cfg(test)]
@@ -59,6 +60,7 @@ pub use quantized::fits_in_steps;
 pub(crate) use regular_file::{check_regular, open_regular, read_regular};
 pub use scene::{BlockInfo, COPYRIGHT, Children, Node, Scene, SharedTexture};
 pub use scene_check::{Element, SceneDefect};
+pub use subset::Subset;
 
 /// The 3D Tiles tileset that a viewer opens, inside an output folder.
 pub const TILESET_FILE: &str = "tileset.json";

@@ -16,7 +16,7 @@ use super::{
     TEXTURES_DIR, TILESET_FILE, TILESETS_DIR,
     cells::{CELLS_DIR, CELLS_FILE},
 };
-use crate::builder::Subset;
+use crate::format::Subset;
 use crate::{Error, Result};
 
 /// The folder of shared textures in results of versions whose node files named `../textures/`.

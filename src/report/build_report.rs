@@ -7,7 +7,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::builder::Subset;
+use crate::format::Subset;
 use crate::format::{NodeId, check_regular};
 use crate::import::is_model;
 use crate::mesh::{Kept, UpAxis, Warnings};

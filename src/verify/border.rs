@@ -97,7 +97,7 @@ mod tests {
         let seams: Vec<Seam> = (0..4)
             .map(|x| {
                 let ends = [position(x), position(x + 1)];
-                Seam { ends, leaves: [0, 1], other_ends: ends }
+                Seam { ends, leaves: [0, 1] }
             })
             .collect();
         // Vertex 5 lies beside the seam.

@@ -13,9 +13,8 @@ use rayon::prelude::*;
 use super::geometry::NodeGeometry;
 use super::sample::cross;
 use super::seams::Seam;
-use super::tree::{apart, input_of, is_leaf, leaves, line};
+use super::tree::{apart, is_leaf, leaves, line};
 use crate::format::{Node, Scene};
-use crate::mesh::NEAR;
 use crate::mesh::box_tree::{BoxTree, Corners};
 
 /// How far a triangle in a cutting plane may be from it, as a share of its longest edge. A border
@@ -39,10 +38,10 @@ pub(super) fn mark(
     steps: &[f64],
 ) {
     let mut planes: Vec<BTreeSet<Plane>> = vec![BTreeSet::new(); geometry.len()];
-    let mut part = |[a, b]: [u32; 2], axis: usize, coordinates: [u64; 2]| {
-        for (line, coordinate) in apart(scene, a, b).into_iter().zip(coordinates) {
+    let mut part = |[a, b]: [u32; 2], plane: Plane| {
+        for line in apart(scene, a, b) {
             if let Some(&topmost) = line.last() {
-                planes[topmost as usize].insert((axis, coordinate));
+                planes[topmost as usize].insert(plane);
             }
         }
     };
@@ -53,14 +52,14 @@ pub(super) fn mark(
         }
         for ([a, b], seams) in pairs {
             let nodes = [a, b].map(|leaf| &scene.nodes[leaf as usize]);
-            if let Some((axis, coordinates)) = plane_between(&seams, nodes, steps[a as usize]) {
-                part([a, b], axis, coordinates);
+            if let Some(plane) = plane_between(&seams, nodes, steps[a as usize]) {
+                part([a, b], plane);
             }
         }
     }
     for axis in 0..3 {
-        for ([a, b], coordinates) in touching_leaves(scene, axis) {
-            part([a, b], axis, coordinates.map(f64::to_bits));
+        for (leaves, coordinate) in touching_leaves(scene, axis) {
+            part(leaves, (axis, coordinate.to_bits()));
         }
     }
     geometry.par_iter_mut().enumerate().for_each(|(number, node)| {
@@ -77,24 +76,15 @@ pub(super) fn mark(
     });
 }
 
-/// Pairs of leaves of which the one's box ends where the other's begins along an axis, and both
-/// coordinates: within [`NEAR`] of each other for two inputs, equal within one input, whose cuts are
-/// exact. Leaves that are flat along the axis are not cut across it.
-fn touching_leaves(scene: &Scene, axis: usize) -> Vec<([u32; 2], [f64; 2])> {
+/// Pairs of leaves of which the one's box ends just where the other's begins along an axis, and the
+/// coordinate. Leaves that are flat along the axis are not cut across it.
+fn touching_leaves(scene: &Scene, axis: usize) -> Vec<([u32; 2], f64)> {
     let node = |leaf: u32| &scene.nodes[leaf as usize];
-    let is_flat = |leaf: u32| node(leaf).bbox_max[axis] - node(leaf).bbox_min[axis] <= 2.0 * NEAR;
+    let is_flat = |leaf: u32| node(leaf).bbox_max[axis] <= node(leaf).bbox_min[axis];
     let begins = |leaf: u32| node(leaf).bbox_min[axis] + 0.0;
     let mut leaves = leaves(scene);
     leaves.retain(|&leaf| !is_flat(leaf));
     leaves.sort_by(|&a, &b| begins(a).total_cmp(&begins(b)));
-    let meet = |a: u32, b: u32| {
-        let overlap = |at: usize| {
-            node(a).bbox_min[at] - NEAR <= node(b).bbox_max[at]
-                && node(b).bbox_min[at] - NEAR <= node(a).bbox_max[at]
-        };
-        let is_cut = node(a).bbox_max[axis] == node(b).bbox_min[axis];
-        (0..3).all(overlap) && (is_cut || input_of(scene, a) != input_of(scene, b))
-    };
     // The sides at which they begin.
     let side = |&leaf: &u32| {
         let (mut low, mut high) = (node(leaf).bbox_min, node(leaf).bbox_max);
@@ -111,13 +101,12 @@ fn touching_leaves(scene: &Scene, axis: usize) -> Vec<([u32; 2], [f64; 2])> {
         let touches = |bounds: &Corners| {
             (0..3).all(|at| {
                 let [low, high] = range(at);
-                low - NEAR <= bounds[1][at] && bounds[0][at] - NEAR <= high
+                low <= bounds[1][at] && bounds[0][at] <= high
             })
         };
         let mut found: Vec<usize> = sides.matching(touches).collect();
         found.sort_unstable();
-        let others = found.into_iter().map(|number| leaves[number]).filter(|&b| meet(a, b));
-        others.map(|b| ([a, b], [end, begins(b)])).collect::<Vec<_>>()
+        found.into_iter().map(|number| ([a, leaves[number]], end)).collect::<Vec<_>>()
     };
     leaves.par_iter().flat_map_iter(beside).collect()
 }
@@ -133,23 +122,20 @@ fn lies_in(corners: [DVec3; 3], &(axis, bits): &Plane, step: f64) -> bool {
         && corners.iter().all(|corner| (corner[axis] - coordinate).abs() <= beside)
 }
 
-/// The plane that holds most of the edges between two leaves and separates their boxes' middles: its axis, and
-/// its coordinate as each of them has it.
-fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<(usize, [u64; 2])> {
-    let mut best: Option<(f64, (usize, [u64; 2]))> = None;
+/// The plane that holds most of the edges between two leaves and separates their boxes' middles.
+fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<Plane> {
+    let mut best: Option<(f64, Plane)> = None;
     for axis in 0..3 {
         let middle = |node: &Node| (node.bbox_min[axis] + node.bbox_max[axis]) * 0.5;
         let (low, high) = if middle(a) <= middle(b) { (a, b) } else { (b, a) };
-        let mut counts: BTreeMap<u64, (usize, u64)> = BTreeMap::new();
+        let mut counts: BTreeMap<u64, usize> = BTreeMap::new();
         for seam in seams {
             let [from, to] = seam.ends.map(|end| end[axis] + 0.0);
             if from == to {
-                let other = (seam.other_ends[0][axis] + 0.0).to_bits();
-                counts.entry(from.to_bits()).or_insert((0, other)).0 += 1;
+                *counts.entry(from.to_bits()).or_default() += 1;
             }
         }
-        let Some((&bits, &(count, other))) = counts.iter().max_by_key(|(_, (count, _))| *count)
-        else {
+        let Some((&bits, &count)) = counts.iter().max_by_key(|(_, count)| **count) else {
             continue;
         };
         // Vertices near the plane count as on it, so a few edges lie beside it, and small bodies
@@ -161,7 +147,7 @@ fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<(usiz
         let between = middle(low) < coordinate - slack && middle(high) > coordinate + slack;
         let apart = middle(high) - middle(low);
         if between && 2 * count >= seams.len() && best.is_none_or(|(most, _)| apart > most) {
-            best = Some((apart, (axis, [bits, other])));
+            best = Some((apart, (axis, bits)));
         }
     }
     best.map(|(_, plane)| plane)
@@ -170,7 +156,6 @@ fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<(usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::BlockInfo;
     use crate::format::test_scene::scene;
     use crate::scaling::assert_scales;
 
@@ -184,14 +169,13 @@ mod tests {
         let seam = |from: [f64; 3], to: [f64; 3]| Seam {
             ends: [DVec3::from(from), DVec3::from(to)],
             leaves: [0, 1],
-            other_ends: [DVec3::from(from), DVec3::from(to)],
         };
         let flat = [node([0.0; 3], [5.0, 9.0, 0.0]), node([5.0, 0.0, 0.0], [11.0, 9.0, 0.0])];
         let seams =
             [seam([5.0, 0.0, 0.0], [5.0, 4.0, 0.0]), seam([5.0, 4.0, 0.0], [5.0, 9.0, 0.0])];
         let seams: Vec<&Seam> = seams.iter().collect();
         let found = plane_between(&seams, [&flat[0], &flat[1]], 1e-6);
-        assert_eq!(found, Some((0, [5f64.to_bits(); 2])), "not z = 0, where all is");
+        assert_eq!(found, Some((0, 5f64.to_bits())), "not z = 0, where all is");
         let beside = seam([5.01, 0.0, 0.0], [5.02, 4.0, 1.0]);
         assert_eq!(plane_between(&[&beside], [&flat[0], &flat[1]], 1e-6), None);
     }
@@ -236,36 +220,18 @@ mod tests {
     }
 
     /// What a source has on one side of a cut need not have an edge in common with what it has on the
-    /// other; nor need what another scan has there, which may be a little beside it.
+    /// other.
     #[test]
     fn nodes_are_apart_where_their_leaves_touch() {
-        let of_inputs = |inputs: [&str; 2]| {
-            let mut scene = apart_at_5();
-            let block = scene.blocks[0].clone();
-            scene.blocks = inputs
-                .iter()
-                .map(|&input| BlockInfo { input: input.into(), ..block.clone() })
-                .collect();
-            scene.nodes[0].block = None;
-            [(1, 0), (3, 0), (2, 1), (4, 1)].into_iter().for_each(|(node, block)| {
-                scene.nodes[node].block = Some(block);
-            });
-            scene
-        };
-        let scene = of_inputs(["west.obj", "east.obj"]);
-        assert_eq!(touching_leaves(&scene, 0), [([3, 4], [5.0, 5.0])]);
+        let scene = apart_at_5();
+        assert_eq!(touching_leaves(&scene, 0), [([3, 4], 5.0)]);
         assert_eq!(touching_leaves(&scene, 1), []);
-        assert_eq!(touching_leaves(&of_inputs(["west.obj"; 2]), 0), [([3, 4], [5.0, 5.0])]);
-        let changed_in = |scene: &Scene, change: &dyn Fn(&mut Node)| {
+        let changed = |change: &dyn Fn(&mut Node)| {
             let mut scene = scene.clone();
             change(&mut scene.nodes[4]);
             touching_leaves(&scene, 0)
         };
-        let changed = |change: &dyn Fn(&mut Node)| changed_in(&scene, change);
-        assert_eq!(changed(&|node| node.bbox_min[0] = 5.004), [([3, 4], [5.0, 5.004])]);
-        let of_one = of_inputs(["west.obj"; 2]);
-        assert_eq!(changed_in(&of_one, &|node| node.bbox_min[0] = 5.004), []);
-        assert_eq!(changed(&|node| node.bbox_min[0] = 5.1), []);
+        assert_eq!(changed(&|node| node.bbox_min[0] = 5.004), []);
         assert_eq!(changed(&|node| node.bbox_min[1] = 9.1), [], "passes it by");
         assert_eq!(changed(&|node| node.bbox_max[0] = 5.0), [], "flat");
 
@@ -281,7 +247,7 @@ mod tests {
             scene.nodes[4].bbox_min[0] = 5.1;
             scene
         };
-        for (scene, is_surface) in [(apart, true), (scene, false), (of_one, false)] {
+        for (scene, is_surface) in [(apart, true), (scene, false)] {
             let mut geometry = vec![NodeGeometry::default(); 5];
             geometry[1] = with_skirt.clone();
             mark(&scene, &mut geometry, [&[], &[]], &[1e-6; 5]);
@@ -294,11 +260,8 @@ mod tests {
     #[test]
     fn skirts_count_as_none_only_in_a_plane_that_bounds_their_node() {
         let scene = apart_at_5();
-        let seams = [Seam {
-            ends: [DVec3::new(5.0, 0.0, 0.0), DVec3::new(5.0, 9.0, 0.0)],
-            leaves: [3, 4],
-            other_ends: [DVec3::new(5.0, 0.0, 0.0), DVec3::new(5.0, 9.0, 0.0)],
-        }];
+        let seams =
+            [Seam { ends: [DVec3::new(5.0, 0.0, 0.0), DVec3::new(5.0, 9.0, 0.0)], leaves: [3, 4] }];
         let floor = |x: f32| [[x, 0.0, 0.0], [x + 5.0, 0.0, 0.0], [x + 5.0, 9.0, 0.0]];
         let upright = [[5.0, 0.0, 1.0], [5.0, 9.0, 1.0], [5.0, 9.0, 3.0], [5.0, 0.0, 3.0]];
         let geometry_of = |parts: &[&[[f32; 3]]]| {

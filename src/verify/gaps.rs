@@ -12,9 +12,7 @@
 //! may not be left out.
 //!
 //! Two nodes of one level whose borders were thinned alike meet along a line beside the seam; there
-//! their rims are compared too. Where different inputs touch, they meet as blocks of one do; where they
-//! agree to millimetres only, gaps may be as wide as they are apart, and beside districts, which join
-//! them and what is next to them, wider by [`NEAR`]. Where the source has a gap there, it is taken off.
+//! their rims are compared too.
 
 use std::collections::BTreeMap;
 
@@ -28,9 +26,9 @@ use super::options::Limits;
 use super::progress::Progress;
 use super::report::{Check, Failure, GapFigures};
 use super::seams::{Seam, rim};
-use super::tree::{apart, input_of, is_leaf, line};
+use super::tree::{apart, is_leaf, line};
 use crate::format::Scene;
-use crate::mesh::{NEAR, Surface};
+use crate::mesh::Surface;
 
 /// Where along an edge of the seam gaps are measured.
 const PLACES: [f64; 3] = [0.0, 0.5, 1.0];
@@ -53,22 +51,11 @@ struct SeamCheck<'a> {
     /// Where the source ends, and the leaf that has each edge.
     open: &'a [([DVec3; 2], u32)],
     lines: Lines,
-    /// Whether there are several inputs, of which nodes above blocks join vertices that are nearly one.
-    several: bool,
     steps: &'a [f64],
     limits: &'a Limits,
 }
 
 impl SeamCheck<'_> {
-    /// How far the leaves at a seam are from a point of it: where inputs have vertices within each other's edges,
-    /// the source has gaps of its own.
-    fn own_gap(&self, seam: &Seam, point: DVec3) -> f64 {
-        let off = |leaf: u32| {
-            NodeNear::new(&self.geometry[leaf as usize]).meets(point, true).drawn.distance(point)
-        };
-        seam.leaves.map(off).into_iter().fold(0.0, f64::max)
-    }
-
     /// True where the source ends within the node's error of a point, in a leaf below the node.
     fn ends_near(&self, node: u32, point: DVec3) -> bool {
         let reach = self.scene.nodes[node as usize].geometric_error;
@@ -82,8 +69,6 @@ impl SeamCheck<'_> {
 #[derive(Default)]
 struct Found {
     pairs: BTreeMap<[u32; 2], GapFigures>,
-    /// Widest gap between different inputs, metres.
-    between_inputs: f64,
     failures: Vec<(f64, Failure)>,
 }
 
@@ -100,8 +85,7 @@ pub(super) fn gaps(
     let mut check = Check::new("gaps");
     progress.phase("gaps", seams.len() as u64);
     let lines = Lines::new(open.iter().map(|&(ends, _)| ends));
-    let several = scene.blocks.windows(2).any(|two| two[0].input != two[1].input);
-    let checker = SeamCheck { scene, geometry, open, lines, several, steps, limits };
+    let checker = SeamCheck { scene, geometry, open, lines, steps, limits };
     let found: Vec<Found> = groups(scene, seams)
         .par_iter()
         .map(|group| {
@@ -113,7 +97,6 @@ pub(super) fn gaps(
     let mut all = Found::default();
     for found in found {
         all.failures.extend(found.failures);
-        all.between_inputs = all.between_inputs.max(found.between_inputs);
         for (levels, figures) in found.pairs {
             let all = all.pairs.entry(levels).or_default();
             all.points += figures.points;
@@ -142,15 +125,6 @@ pub(super) fn gaps(
         widest(|gap| gap.bare_relative),
         widest(|gap| gap.open),
     );
-    let is_between = |seam: &&Seam| {
-        let [input, other_input] = seam.leaves.map(|leaf| input_of(scene, leaf));
-        input != other_input
-    };
-    let between = seams.iter().filter(is_between).count();
-    if between > 0 {
-        check.summary +=
-            &format!("; of these {between} edges between inputs, {:.2e} m", all.between_inputs);
-    }
     (figures, check)
 }
 
@@ -196,17 +170,13 @@ impl SeamCheck<'_> {
         let mut failures = Worst::default();
         for (number, (seam, [ones, others])) in (0..).zip(seams.iter().zip(&sides)) {
             let points = points(seam);
-            let [input, other_input] = seam.leaves.map(|leaf| input_of(scene, leaf));
             for (&a, &b) in ones.iter().flat_map(|a| others.iter().map(move |b| (a, b))) {
                 if is_leaf(scene, a) && is_leaf(scene, b) {
                     continue;
                 }
                 let level = |node: u32| scene.nodes[node as usize].level;
                 let error = |node: u32| scene.nodes[node as usize].geometric_error;
-                let rounding = limits.gap_steps * steps[a as usize].max(steps[b as usize]);
-                let is_above_blocks = |node: u32| scene.nodes[node as usize].block.is_none();
-                let joined = self.several && (is_above_blocks(a) || is_above_blocks(b));
-                let allowed = rounding + seam.apart() + if joined { NEAR } else { 0.0 };
+                let allowed = limits.gap_steps * steps[a as usize].max(steps[b as usize]);
                 let same_level = level(a) == level(b);
                 let error = error(a).max(error(b));
                 let levels = [level(a).min(level(b)), level(a).max(level(b))];
@@ -221,9 +191,6 @@ impl SeamCheck<'_> {
                         let rim = |node: u32| meets.get(&node).map_or(point, |at| at.rim(point));
                         open = open.min(rim(a).distance(rim(b)));
                     }
-                    if input != other_input && open > allowed {
-                        open = (open - self.own_gap(seam, point)).max(0.0);
-                    }
                     let figures = found.pairs.entry(levels).or_default();
                     let left_out =
                         |meets: Meets, node: u32| !meets.kept && self.ends_near(node, point);
@@ -232,9 +199,6 @@ impl SeamCheck<'_> {
                     if too_wide && (left_out(one, a) || left_out(other, b)) {
                         figures.left_out += 1;
                         continue;
-                    }
-                    if input != other_input {
-                        found.between_inputs = found.between_inputs.max(open);
                     }
                     figures.points += 1;
                     figures.open = figures.open.max(open);

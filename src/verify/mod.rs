@@ -163,7 +163,7 @@ impl Verification<'_> {
         let leaves = tree::leaves(scene);
         let steps = step::steps(scene);
         report.scene = Some(facts(scene, &leaves, &geometry, &steps));
-        let rims = seams::Rims::new(scene, &leaves, &geometry);
+        let rims = seams::Rims::new(&leaves, &geometry);
         let seams = rims.seams();
         let between = rims.between_vertices();
         cut_planes::mark(scene, &mut geometry, [&seams, &between], &steps);

@@ -1,18 +1,13 @@
 //! Where leaves meet: the edges that two of them share, which cutting planes made.
 //!
 //! Positions at both sides of a cut are equal in every bit, so equal edges are found by sorting.
-//! Where two blocks of the source touch in the same way, their common edges count too.
-
-use std::collections::BTreeMap;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
 use super::geometry::NodeGeometry;
-use super::tree::input_of;
-use crate::format::Scene;
-use crate::mesh::{NEAR, NearVertices, PositionKey, key};
+use crate::mesh::{PositionKey, key};
 
 /// An edge that two leaves share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,16 +16,6 @@ pub(super) struct Seam {
     pub ends: [DVec3; 2],
     /// The leaves, the lower number first.
     pub leaves: [u32; 2],
-    /// Its ends as the second leaf has them: the same but between inputs that nearly agree.
-    pub other_ends: [DVec3; 2],
-}
-
-impl Seam {
-    /// How far its ends are apart as the two leaves have them, at most; metres.
-    pub fn apart(&self) -> f64 {
-        let apart = |end: usize| self.ends[end].distance(self.other_ends[end]);
-        apart(0).max(apart(1))
-    }
 }
 
 /// An edge that is not between just two triangles.
@@ -98,100 +83,29 @@ pub(super) fn open_edges(
     rim.into_iter().filter(|edge| edge.uses % 2 == 1).map(|edge| edge.ends).collect()
 }
 
-/// Gives vertices of different inputs that may be one the same key: that of the input that comes first.
-/// Returns the keys of those that are not at one place.
-fn join_inputs<'a>(
-    edges: &mut [(RimEdge, u32)],
-    input_of: impl Fn(u32) -> Option<&'a str>,
-) -> FxHashSet<PositionKey<f64>> {
-    let mut of_inputs: BTreeMap<Option<&str>, Vec<[[f64; 3]; 2]>> = BTreeMap::new();
-    for (edge, leaf) in edges.iter().filter(|(edge, _)| edge.uses % 2 == 1) {
-        of_inputs.entry(input_of(*leaf)).or_default().push(edge.ends.map(|end| end.to_array()));
-    }
-    let mut apart = FxHashSet::default();
-    if of_inputs.len() < 2 {
-        return apart;
-    }
-    let vertices = |(input, edges): (Option<&'a str>, Vec<[[f64; 3]; 2]>)| {
-        (input, NearVertices::new(edges.into_iter(), NEAR))
-    };
-    let inputs: Vec<_> = of_inputs.into_iter().map(vertices).collect();
-    let mut joined: FxHashMap<(Option<&str>, PositionKey<f64>), PositionKey<f64>> =
-        FxHashMap::default();
-    for (number, (input, vertices)) in inputs.iter().enumerate() {
-        for (first, before) in inputs[..number].iter().filter(|(_, other)| vertices.meet(other)) {
-            for ([own, other], distance) in vertices.pairs(before) {
-                let own = key(vertices.positions()[own as usize]);
-                let other = key(before.positions()[other as usize]);
-                let other = joined.get(&(*first, other)).copied().unwrap_or(other);
-                joined.entry((*input, own)).or_insert(other);
-                if distance > 0.0 {
-                    apart.insert(other);
-                }
-            }
-        }
-    }
-    for (edge, leaf) in edges {
-        let input = input_of(*leaf);
-        edge.keys = edge.keys.map(|own| joined.get(&(input, own)).copied().unwrap_or(own));
-        if edge.keys[1] < edge.keys[0] {
-            edge.keys.reverse();
-            edge.ends.reverse();
-        }
-    }
-    apart
-}
-
 /// The rims of all leaves, equal edges side by side, in a fixed order.
-pub(super) struct Rims {
-    /// Vertices of several inputs that are not at one place.
-    apart: FxHashSet<PositionKey<f64>>,
-    /// A number for the input of each node.
-    inputs: Vec<u32>,
-    edges: Vec<(RimEdge, u32)>,
-}
+pub(super) struct Rims(Vec<(RimEdge, u32)>);
 
 impl Rims {
     /// Of these leaves.
-    pub fn new(scene: &Scene, leaves: &[u32], geometry: &[NodeGeometry]) -> Self {
+    pub fn new(leaves: &[u32], geometry: &[NodeGeometry]) -> Self {
         let rim = |&leaf: &u32| rim(&geometry[leaf as usize]).into_iter().map(move |e| (e, leaf));
         let mut edges: Vec<(RimEdge, u32)> = leaves.par_iter().flat_map_iter(rim).collect();
-        let apart = join_inputs(&mut edges, |leaf| input_of(scene, leaf));
         edges.par_sort_unstable_by_key(|&(edge, leaf)| (edge.keys, leaf));
-        let mut numbers: BTreeMap<Option<&str>, u32> = BTreeMap::new();
-        let mut number = |node: u32| {
-            let next = numbers.len() as u32;
-            *numbers.entry(input_of(scene, node)).or_insert(next)
-        };
-        let inputs = (0..scene.nodes.len() as u32).map(&mut number).collect();
-        Self { apart, inputs, edges }
+        Self(edges)
     }
 
     fn equal(&self) -> impl Iterator<Item = &[(RimEdge, u32)]> {
-        self.edges.chunk_by(|a, b| a.0.keys == b.0.keys)
+        self.0.chunk_by(|a, b| a.0.keys == b.0.keys)
     }
 
-    /// All edges that several leaves share, once for each pair of leaves; of different inputs those at which
-    /// both end.
+    /// All edges that several leaves share, once for each pair of leaves.
     pub fn seams(&self) -> Vec<Seam> {
         let mut seams = Vec::new();
         for same in self.equal() {
-            let input = |leaf: u32| self.inputs[leaf as usize];
-            let ends = |of: u32| {
-                let of_input = same.iter().filter(|&&(_, leaf)| input(leaf) == of);
-                of_input.map(|(edge, _)| edge.uses).sum::<u32>() == 1
-            };
-            let meet = |a: u32, b: u32| {
-                let [a, b] = [a, b].map(input);
-                a == b || (ends(a) && ends(b))
-            };
             for (index, &(edge, a)) in same.iter().enumerate() {
-                let others = same[index + 1..].iter().filter(|&&(_, b)| a != b && meet(a, b));
-                seams.extend(others.map(|&(other, b)| Seam {
-                    ends: edge.ends,
-                    leaves: [a, b],
-                    other_ends: other.ends,
-                }));
+                let others = same[index + 1..].iter().filter(|&&(_, b)| a != b);
+                seams.extend(others.map(|&(_, b)| Seam { ends: edge.ends, leaves: [a, b] }));
             }
         }
         seams
@@ -199,38 +113,24 @@ impl Rims {
 
     /// Edges of one leaf alone that lie between two vertices of another's rim, once for each such
     /// other: where a cutting plane passes through borders of the source that have vertices within
-    /// each other's edges, no edge is shared. Of different inputs those at which both end.
+    /// each other's edges, no edge is shared.
     pub fn between_vertices(&self) -> Vec<Seam> {
         let alone = || self.equal().filter(|same| same.len() == 1).map(|same| same[0]);
-        let is_end = |edge: &RimEdge| edge.uses == 1;
-        // Leaves, and whether they end there.
-        let mut leaves_at: FxHashMap<PositionKey<f64>, Vec<(u32, bool)>> = FxHashMap::default();
+        let mut leaves_at: FxHashMap<PositionKey<f64>, Vec<u32>> = FxHashMap::default();
         for (edge, leaf) in alone() {
             for end in edge.keys {
                 let leaves = leaves_at.entry(end).or_default();
-                match leaves.iter_mut().find(|(known, _)| *known == leaf) {
-                    Some((_, ends)) => *ends |= is_end(&edge),
-                    None => leaves.push((leaf, is_end(&edge))),
+                if !leaves.contains(&leaf) {
+                    leaves.push(leaf);
                 }
             }
         }
         let mut seams = Vec::new();
         for (edge, leaf) in alone() {
-            let input = |leaf: u32| self.inputs[leaf as usize];
-            let meets = |&&(other, ends): &&(u32, bool)| {
-                other != leaf && (input(other) == input(leaf) || (ends && is_end(&edge)))
-            };
             let [from, to] = edge.keys.map(|end| &leaves_at[&end]);
-            let others = from.iter().filter(meets).map(|(other, _)| *other);
-            let others = others.filter(|&other| to.iter().any(|(leaf, _)| *leaf == other));
-            // As far as they may be, where they are not at one place.
-            let is_apart = edge.keys.iter().any(|end| self.apart.contains(end));
-            let off = if is_apart { DVec3::X * NEAR } else { DVec3::ZERO };
-            let seam = |other: u32| Seam {
-                ends: edge.ends,
-                leaves: [leaf.min(other), leaf.max(other)],
-                other_ends: edge.ends.map(|end| end + off),
-            };
+            let others = from.iter().filter(|&&other| other != leaf && to.contains(&other));
+            let seam =
+                |&other: &u32| Seam { ends: edge.ends, leaves: [leaf.min(other), leaf.max(other)] };
             seams.extend(others.map(seam));
         }
         seams
@@ -248,7 +148,6 @@ impl Rims {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::test_scene::scene;
 
     fn square(origin: f64, from: f32) -> NodeGeometry {
         NodeGeometry {
@@ -269,14 +168,9 @@ mod tests {
     fn leaves_with_different_origins_meet_at_equal_edges() {
         let nodes = [square(100.0, 0.0), square(101.0, 0.0), square(102.0, 0.5)];
         assert_eq!(rim(&nodes[0]).len(), 4, "the diagonal is inside");
-        let mut scene = scene();
-        scene.nodes.iter_mut().for_each(|node| node.block = Some(0));
-        let rims = Rims::new(&scene, &[0, 1, 2], &nodes);
+        let rims = Rims::new(&[0, 1, 2], &nodes);
         let x = DVec3::new(101.0, 0.0, 0.0);
-        assert_eq!(
-            rims.seams(),
-            [Seam { ends: [x, x + DVec3::Y], leaves: [0, 1], other_ends: [x, x + DVec3::Y] }]
-        );
+        assert_eq!(rims.seams(), [Seam { ends: [x, x + DVec3::Y], leaves: [0, 1] }]);
         // Three squares have twelve sides; two of them meet.
         let open = rims.open();
         assert_eq!(open.len(), 10);
@@ -294,19 +188,9 @@ mod tests {
         halves.positions.extend([[1.0, 2.0, 0.0], [0.0, 2.0, 0.0]]);
         halves.triangles.extend([[3, 2, 4], [3, 4, 5]]);
         let nodes = [high, halves];
-        let rims = Rims::new(&scene, &[0, 1], &nodes);
+        let rims = Rims::new(&[0, 1], &nodes);
         assert_eq!(rims.seams(), []);
         let ends = [x, x + DVec3::Y * 2.0];
-        assert_eq!(rims.between_vertices(), [Seam { ends, leaves: [0, 1], other_ends: ends }]);
-
-        // Two inputs meet where they agree to millimetres; one does not.
-        let nodes = [square(100.0, 0.0), square(101.003, 0.0)];
-        assert_eq!(Rims::new(&scene, &[0, 1], &nodes).seams(), []);
-        scene.blocks[1].input = "other.obj".into();
-        scene.nodes[1].block = Some(1);
-        let rims = Rims::new(&scene, &[0, 1], &nodes);
-        let [seam] = rims.seams()[..] else { panic!("{:?}", rims.seams()) };
-        assert!((seam.apart() - 0.003).abs() < 1e-9 && seam.leaves == [0, 1], "{seam:?}");
-        assert_eq!(rims.open().len(), 6);
+        assert_eq!(rims.between_vertices(), [Seam { ends, leaves: [0, 1] }]);
     }
 }

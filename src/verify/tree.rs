@@ -28,12 +28,6 @@ pub(super) fn coarse_levels(scene: &Scene) -> u32 {
         .unwrap_or(0)
 }
 
-/// The input file that a node came from.
-pub(super) fn input_of(scene: &Scene, node: u32) -> Option<&str> {
-    let block = scene.nodes[node as usize].block?;
-    Some(&scene.blocks.get(block as usize)?.input)
-}
-
 /// For two leaves, the lines above each up to where they meet, that excluded.
 pub(super) fn apart(scene: &Scene, a: u32, b: u32) -> [Vec<u32>; 2] {
     let mut lines = [a, b].map(|leaf| line(scene, leaf).collect::<Vec<_>>());

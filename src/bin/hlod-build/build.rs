@@ -26,7 +26,7 @@ pub struct BuildArgs {
     paths: Vec<PathBuf>,
 
     /// Divides the city into blocks, whatever its files and groups are: `auto` (cells of at most 128
-    /// times --desired-tris triangles), or `grid:METRES` (squares of METRES on the ground)
+    /// times --desired-tris triangles and 2^26 texels), or `grid:METRES` (squares of METRES on the ground)
     #[arg(long, value_name = "MODE", default_value = "auto", help_heading = "Hierarchy")]
     blocks: BlockSplit,
     /// Nodes above the blocks, so that a view of a whole city costs the same however many blocks it

@@ -201,7 +201,7 @@ impl<C: Coordinate> CutPlane<C> {
 
 /// Splits the edge graph into runs of vertex indices between fixed vertices; loops are opened at
 /// their first vertex (in index order) and repeat it at the end.
-pub(super) fn chains_of<C>(vertices: &[BorderVertex<C>], edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
+pub fn chains_of<C>(vertices: &[BorderVertex<C>], edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
     let mut neighbours: Vec<Vec<(u32, u32)>> = vec![Vec::new(); vertices.len()];
     for (number, &[a, b]) in edges.iter().enumerate() {
         neighbours[a as usize].push((b, number as u32));

@@ -1,12 +1,8 @@
-//! What a cutting plane leaves behind: a border that both sides thin alike, skirts and caps.
+//! What a cutting plane leaves behind: a border that both sides thin alike, and skirts.
 
-pub mod cap;
 pub mod chain;
 pub(crate) mod cover;
-pub mod face;
-pub mod mark;
 pub mod rank;
-pub mod record;
 pub mod skirt;
 pub mod skirt_rules;
 pub mod slit;

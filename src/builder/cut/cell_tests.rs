@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use super::cell::CellCut;
 use super::section::Triangle;
 use crate::builder::border::chain::KeepRule;
-use crate::builder::border::face::{FaceBorder, SideTriangle};
 use crate::builder::constants::BorderConstants;
-use crate::builder::partition::{BlockSplit, CellBox, Partition, Scan};
+use crate::builder::cut::face::{FaceBorder, SideTriangle};
+use crate::builder::partition::{BlockSplit, CellBox, Most, Partition, Scan};
 use crate::lattice::Lattice;
 use crate::mesh::{Model, Part, PositionKey, UpAxis, key, wide};
 use crate::random::Random;
@@ -60,7 +60,8 @@ struct Cut {
 }
 
 fn cut(model: &Model, most: u64, lattice: Lattice) -> Cut {
-    let clusters = Scan::of(model, 1.0).clusters;
+    let clusters = Scan::of(model, &[], 1.0).clusters;
+    let most = Most { triangles: most, texels: f64::INFINITY };
     let partition = Partition::new(clusters, BlockSplit::Auto, most, UpAxis::Z);
     let mut pieces: BTreeMap<u32, Vec<[[f64; 3]; 3]>> = BTreeMap::new();
     let part = &model.parts[0];

@@ -21,9 +21,8 @@ use crate::builder::border::chain::{BorderVertex, CutPlane, KeepRule};
 use crate::builder::border::rank::SurfaceQuadric;
 use crate::builder::border::vertex::{Border, Path};
 use crate::builder::cut::uncut::UncutComponents;
-use crate::builder::simplify::compact::renumber;
 use crate::lattice::Lattice;
-use crate::mesh::{Coordinate, Mesh, Normal, PositionKey, all_differ, key, wide};
+use crate::mesh::{Coordinate, Mesh, Normal, PositionKey, all_differ, key, renumber, wide};
 
 /// Limits of the labelling.
 #[derive(Clone, Copy, Debug)]

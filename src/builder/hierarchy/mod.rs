@@ -31,12 +31,11 @@ use crate::builder::border::vertex::Border;
 use crate::builder::cut::split::Chunk;
 use crate::builder::error::{Below, Original, SurfaceError};
 use crate::builder::simplify::aggregate::{BodyRules, Extrudable, has_many_bodies};
-use crate::builder::simplify::compact::renumber;
 use crate::builder::simplify::merge::merge;
 use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::{Stage, Stages};
 use crate::lattice::{Lattice, Quantization};
-use crate::mesh::{Mesh, UpAxis};
+use crate::mesh::{Mesh, UpAxis, renumber};
 use crate::texture::BakePlan;
 
 /// Chunks with more than this many times the desired triangles are divided and built in parallel.

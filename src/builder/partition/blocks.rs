@@ -1,5 +1,14 @@
 //! Where cells are divided no further.
 
+/// What a block has at most, about, where no grid says what blocks are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Most {
+    /// Triangles.
+    pub triangles: u64,
+    /// Texels of the source.
+    pub texels: f64,
+}
+
 /// How inputs become blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum BlockSplit {

@@ -10,7 +10,7 @@ mod bodies;
 mod cell_box;
 mod scan;
 
-pub use self::blocks::BlockSplit;
+pub use self::blocks::{BlockSplit, Most};
 pub use self::bodies::{Bodies, Others};
 pub use self::cell_box::CellBox;
 pub use self::scan::{Cluster, Scan};
@@ -70,9 +70,8 @@ const LEAST_SHARE: f64 = 1.0 / (1 << 20) as f64;
 const FEW: f64 = 0.005;
 
 impl Partition {
-    /// Of what inputs have, in any order; blocks have about `most` triangles at most, where no grid says
-    /// what they are.
-    pub fn new(mut clusters: Vec<Cluster>, split: BlockSplit, most: u64, up: UpAxis) -> Self {
+    /// Of what inputs have, in any order.
+    pub fn new(mut clusters: Vec<Cluster>, split: BlockSplit, most: Most, up: UpAxis) -> Self {
         let first = Cell { place: CellBox::ALL, split: None, triangles: 0, extent: 0.0 };
         let mut partition = Self { cells: vec![first] };
         let whole = scan::middles(&clusters).longest();
@@ -202,7 +201,7 @@ fn extent(clusters: &[Cluster], triangles: u64, place: &CellBox) -> f64 {
 /// How cells are divided.
 struct Dividing {
     split: BlockSplit,
-    most: u64,
+    most: Most,
     up: UpAxis,
     /// What extends over less is not divided, metres.
     least: f64,
@@ -216,7 +215,8 @@ impl Dividing {
         let side = |axis: usize| middles.length(axis);
         match self.split {
             BlockSplit::Auto => {
-                if triangles <= self.most {
+                let texels: f64 = clusters.iter().map(|cluster| cluster.texels).sum();
+                if triangles <= self.most.triangles && texels <= self.most.texels {
                     return None;
                 }
                 // The longest first; the first of equals.

@@ -8,9 +8,28 @@ fn city(count: usize, side: f64, at: [f64; 2], seed: u64) -> Vec<Cluster> {
         .map(|_| {
             let place = [at[0] + random.between(0.0, side), at[1] + random.between(0.0, side), 3.0];
             let around = CellBox { low: place, high: place };
-            Cluster { triangles: 64, middles: around, largest: 1.0, around }
+            Cluster { triangles: 64, texels: 0.0, middles: around, largest: 1.0, around }
         })
         .collect()
+}
+
+/// Blocks of so many triangles at most, whatever they have of texels.
+fn triangles(triangles: u64) -> Most {
+    Most { triangles, texels: f64::INFINITY }
+}
+
+#[test]
+fn blocks_have_no_more_texels_than_they_may() {
+    let mut clusters = city(1024, 700.0, [0.0, 0.0], 6);
+    // The east has fine textures.
+    let is_fine = |cluster: &&mut Cluster| cluster.middles.low[0] > 350.0;
+    clusters.iter_mut().filter(is_fine).for_each(|cluster| cluster.texels = 1000.0);
+    let most = Most { triangles: 1 << 20, texels: 100_000.0 };
+    let partition = Partition::new(clusters, BlockSplit::Auto, most, UpAxis::Z);
+    let blocks = partition.blocks();
+    assert!((6..=32).contains(&blocks.len()), "{}", blocks.len());
+    let west = blocks.iter().filter(|&&block| partition.cell(block).place.high[0] <= 350.0);
+    assert!(west.count() <= 2, "there is nothing to divide");
 }
 
 #[test]
@@ -27,7 +46,8 @@ fn the_coarsest_multiple_between_two_numbers_is_found() {
 #[test]
 fn blocks_fit_and_fill_space_without_overlap() {
     let clusters = city(4000, 700.0, [678_000.0, 5_403_000.0], 1);
-    let partition = Partition::new(clusters.clone(), BlockSplit::Auto, 16_000, UpAxis::Z);
+    let partition =
+        Partition::new(clusters.clone(), BlockSplit::Auto, triangles(16_000), UpAxis::Z);
     let blocks = partition.blocks();
     assert!(blocks.len() >= 16 && blocks.len() <= 64, "{}", blocks.len());
     let mut in_blocks = 0;
@@ -52,7 +72,7 @@ fn blocks_fit_and_fill_space_without_overlap() {
 #[test]
 fn what_is_beyond_a_side_has_the_same_side() {
     let clusters = city(3000, 900.0, [-450.0, 120.0], 2);
-    let partition = Partition::new(clusters, BlockSplit::Auto, 9000, UpAxis::Z);
+    let partition = Partition::new(clusters, BlockSplit::Auto, triangles(9000), UpAxis::Z);
     let mut pairs = 0;
     for block in partition.blocks() {
         for (axis, upper) in [(0, false), (0, true), (1, false), (1, true)] {
@@ -75,7 +95,7 @@ fn a_change_in_one_place_moves_no_plane_elsewhere() {
         .copied()
         .collect();
     let places = |clusters: Vec<Cluster>| {
-        let partition = Partition::new(clusters, BlockSplit::Auto, 10_000, UpAxis::Z);
+        let partition = Partition::new(clusters, BlockSplit::Auto, triangles(10_000), UpAxis::Z);
         let blocks = partition.blocks().into_iter();
         blocks.map(|block| partition.cell(block).place).collect::<Vec<_>>()
     };
@@ -89,7 +109,7 @@ fn a_change_in_one_place_moves_no_plane_elsewhere() {
 #[test]
 fn squares_of_a_grid_are_blocks() {
     let clusters = city(3000, 100.0, [0.0, 0.0], 5);
-    let partition = Partition::new(clusters, BlockSplit::Grid(25.0), 0, UpAxis::Z);
+    let partition = Partition::new(clusters, BlockSplit::Grid(25.0), triangles(0), UpAxis::Z);
     let blocks = partition.blocks();
     assert_eq!(blocks.len(), 16);
     for block in blocks {
@@ -104,9 +124,9 @@ fn squares_of_a_grid_are_blocks() {
 #[test]
 fn places_in_one_point_are_not_divided_for_ever() {
     let around = CellBox { low: [1.0; 3], high: [1.0; 3] };
-    let point = Cluster { triangles: 1 << 20, middles: around, largest: 0.5, around };
-    let partition = Partition::new(vec![point; 9], BlockSplit::Auto, 1000, UpAxis::Z);
+    let point = Cluster { triangles: 1 << 20, texels: 0.0, middles: around, largest: 0.5, around };
+    let partition = Partition::new(vec![point; 9], BlockSplit::Auto, triangles(1000), UpAxis::Z);
     assert_eq!(partition.blocks().len(), 1);
-    let partition = Partition::new(Vec::new(), BlockSplit::Auto, 1000, UpAxis::Z);
+    let partition = Partition::new(Vec::new(), BlockSplit::Auto, triangles(1000), UpAxis::Z);
     assert_eq!(partition.blocks(), [0]);
 }

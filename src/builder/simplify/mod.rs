@@ -1,6 +1,7 @@
 //! Bringing a node to its triangle budget.
 
 pub(crate) mod aggregate;
+pub mod cap;
 pub mod cluster;
 pub mod collapse;
 pub mod compact;

@@ -10,8 +10,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use rustc_hash::FxHashSet;
 
 use crate::builder::border::chain::{BorderVertex, CutPlane, KeepRule};
-use crate::builder::border::face::FaceVertex;
-use crate::builder::border::record::{RecordedBorder, RecordedFace};
+use crate::builder::cut::face::FaceVertex;
+use crate::builder::cut::record::{RecordedBorder, RecordedFace};
 use crate::builder::partition::CellBox;
 use crate::lattice::Lattice;
 use crate::mesh::{PositionKey, key};

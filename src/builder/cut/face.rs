@@ -10,8 +10,8 @@ use std::sync::Arc;
 
 use rustc_hash::FxHasher;
 
-use super::chain::{BorderVertex, CutPlane, KeepRule};
-use super::rank::SurfaceQuadric;
+use crate::builder::border::chain::{BorderVertex, CutPlane, KeepRule};
+use crate::builder::border::rank::SurfaceQuadric;
 use crate::builder::cut::cell::CellSide;
 use crate::builder::cut::section::{AxisPlane, Line, Place, Triangle, side};
 use crate::builder::partition::CellBox;

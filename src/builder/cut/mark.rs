@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
 
-use super::chain::{Chain, CutPlane};
-use super::vertex::{Border, Path};
+use crate::builder::border::chain::{Chain, CutPlane};
+use crate::builder::border::vertex::{Border, Path};
 use crate::builder::cut::split::Chunk;
 use crate::mesh::{PositionKey, key};
 

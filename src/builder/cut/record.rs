@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use super::face::{FaceBorder, FaceVertex};
-use super::rank::SurfaceQuadric;
+use crate::builder::border::rank::SurfaceQuadric;
 use crate::{Error, Result};
 
 /// The border in one plane.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::format::SUBSETS_DIR;
+use super::SUBSETS_DIR;
 
 /// One of so many shares of a build's blocks: `3/8` is the third of eight.
 #[derive(

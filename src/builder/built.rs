@@ -1,0 +1,43 @@
+//! Blocks whose nodes are written.
+
+use std::collections::BTreeMap;
+
+use crate::builder::emit::disk_sink::NodeRecord;
+use crate::builder::hierarchy::Tree;
+use crate::format::{BORDERS_DIR, BlockInfo, SharedTexture};
+use crate::report::build_report::BlockReport;
+use crate::texture::SharedTextures;
+
+/// A block whose nodes are written.
+#[derive(Clone, Debug)]
+pub struct BuiltBlock {
+    /// For `scene.hlod`.
+    pub info: BlockInfo,
+    /// Its nodes: one tree, or several where roots are left out.
+    pub trees: Vec<Tree<NodeRecord>>,
+    /// For `build.json`.
+    pub report: BlockReport,
+}
+
+impl BuiltBlock {
+    /// Visits all records, parents first.
+    pub fn for_each<'a>(&'a self, visit: &mut impl FnMut(&'a NodeRecord)) {
+        self.trees.iter().for_each(|tree| tree.for_each(visit));
+    }
+}
+
+/// The file of the borders of a block, inside an output folder.
+pub fn border_file(name: &str) -> String {
+    format!("{BORDERS_DIR}/{name}.border")
+}
+
+/// What has come of blocks.
+#[derive(Default)]
+pub struct BuiltBlocks {
+    /// By cell, those of each in their order.
+    pub blocks: BTreeMap<u32, Vec<BuiltBlock>>,
+    /// Shared textures of earlier results, by name.
+    pub reused_textures: BTreeMap<String, SharedTexture>,
+    /// Those of this build.
+    pub shared: SharedTextures,
+}
