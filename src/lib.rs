@@ -14,7 +14,7 @@
 //! 5. [`decode`]: images; [`runtime`]: scenes in memory; [`render`]: drawing
 //! 6. [`import`]: OBJ and glTF; [`texture`]: atlases and baking; [`engine`]: what to draw
 //! 7. [`report`]: how a result was made; [`loading`]: nodes on their way into memory
-//! 8. [`builder`]: from inputs to a result; [`bench`]: replaying paths
+//! 8. [`builder`]: from inputs to a result; [`bench`](mod@bench): replaying paths
 //! 9. [`cells`]: faces of what is far off
 //! 10. [`verify`]: checking a result
 

@@ -73,7 +73,7 @@ fn stand_in(part: Mesh, border: Border, method: &Method) -> (Mesh, Border) {
     let free = vec![false; part.positions.len()];
     let rules = method.bodies();
     match Bodies::of(&part, &free, &rules).extruded(&part, TRIANGLES, &rules) {
-        Some(Extruded { prisms, rest, .. }) if rest.is_empty() => {
+        Some(Extruded { prisms, rest: [], .. }) => {
             let border = Border::interior(prisms.positions.len());
             (prisms, border)
         }
