@@ -90,15 +90,22 @@ impl<'a> Walk<'a> {
         if best.0.is_nan() {
             best.0 = f64::INFINITY;
         }
-        // Distances to boxes are those of f32.
-        let slack = self.magnitude * 4.0 * f64::from(f32::EPSILON);
+        // Distances to boxes are those of f32, and so are those by which most triangles are passed over.
+        let epsilon = f64::from(f32::EPSILON);
+        let slack = self.magnitude * 4.0 * epsilon;
         let reach = |distance: f64| (distance + slack) as f32;
         let mut leaves = 0;
         let to = self.to;
-        self.search.leaves_near(point.as_vec3(), reach(best.0), |part, leaf| {
+        let of_triangles = slack + 24.0 * epsilon * f64::from(to.longest);
+        let place = point.as_vec3();
+        self.search.leaves_near(place, reach(best.0), |part, leaf| {
             leaves += 1;
-            let count = to.parts[part as usize].bvh.counts[leaf as usize];
-            for lane in 0..u32::from(count) {
+            let bvh = &to.parts[part as usize].bvh;
+            let squared = bvh.leaves[leaf as usize].squared_distances(place);
+            for lane in 0..u32::from(bvh.counts[leaf as usize]) {
+                if f64::from(squared[lane as usize]).sqrt() > best.0 + of_triangles {
+                    continue;
+                }
                 let corners = to.exact_corners(TriangleId { part, leaf, lane });
                 let Some(frame) = corners.map(Frame::new) else { return -1.0 };
                 let distance = frame.distance(point);
