@@ -7,6 +7,7 @@
 
 use std::collections::BTreeSet;
 
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use super::{CellBox, Cluster, Partition};
@@ -39,14 +40,7 @@ impl Bodies {
         }
         let vertices: usize = model.parts.iter().map(|part| part.positions.len()).sum();
         let mut sets = DisjointSet::new(vertices);
-        let mut first_at: FxHashMap<PositionKey<f64>, u32> = FxHashMap::default();
-        first_at.reserve(vertices);
-        let positions = model.parts.iter().flat_map(|part| &part.positions);
-        for (vertex, &position) in (0u32..).zip(positions) {
-            let first = *first_at.entry(key(position)).or_insert(vertex);
-            sets.join(first, vertex);
-        }
-        drop(first_at);
+        join_places(model, &mut sets);
         let mut first = 0u32;
         for part in &model.parts {
             for &[a, b, c] in part.indices.as_chunks::<3>().0 {
@@ -92,6 +86,28 @@ impl Bodies {
     pub fn block_of(&self, part: usize, triangle: usize) -> Option<u32> {
         let block = *self.blocks.get(part)?.get(triangle)?;
         (block != NONE).then_some(block)
+    }
+}
+
+/// Makes one set of all vertices at one position, numbered through all parts. They are sorted: a hash map of
+/// them would take more memory than the model.
+fn join_places(model: &Model, sets: &mut DisjointSet) {
+    let mut firsts = Vec::with_capacity(model.parts.len());
+    let mut vertices: Vec<[u32; 2]> = Vec::with_capacity(sets.len());
+    let mut first = 0u32;
+    for (number, part) in (0..).zip(&model.parts) {
+        firsts.push(first);
+        first += part.positions.len() as u32;
+        vertices.extend((0..part.positions.len() as u32).map(|vertex| [number, vertex]));
+    }
+    let place =
+        |[part, vertex]: [u32; 2]| key(model.parts[part as usize].positions[vertex as usize]);
+    vertices.par_sort_unstable_by_key(|&vertex| place(vertex));
+    let number = |[part, vertex]: [u32; 2]| firsts[part as usize] + vertex;
+    for pair in vertices.windows(2) {
+        if place(pair[0]) == place(pair[1]) {
+            sets.join(number(pair[0]), number(pair[1]));
+        }
     }
 }
 
