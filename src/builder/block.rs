@@ -29,7 +29,7 @@ use crate::texture::BakeReason;
 /// Steps of simplification that borders between blocks are ranked for.
 const RANKED_STEPS: u32 = 8;
 
-/// What identifies a block.
+/// This identifies a block.
 #[derive(Clone)]
 pub struct BlockLabel {
     /// Beginning of its files' names, unique in the output.
@@ -44,7 +44,7 @@ pub struct BlockLabel {
 
 /// A block about to be built.
 pub struct Draft {
-    /// What identifies it.
+    /// This identifies it.
     pub label: BlockLabel,
     /// Its triangles of all inputs; their materials are those of its [`BlockMaterials`].
     pub parts: BlockParts,
@@ -54,7 +54,7 @@ pub struct Draft {
 
 /// This builds one block.
 pub struct DraftBuilder<'a> {
-    /// Those of the block.
+    /// The block has these materials.
     pub materials: &'a BlockMaterials,
     /// It says how nodes are made, and writes them.
     pub setup: &'a BlockSetup<'a>,

@@ -1,6 +1,6 @@
 //! The materials and textures of a block as one model, whichever inputs they are of.
 //!
-//! What looks alike is one material, whichever input has it. Untextured materials that differ in colour
+//! Materials that look alike are one, whichever input has them. Untextured materials that differ in colour
 //! only become one with vertex colours ([`Folding`]).
 
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ pub struct InputLooks {
 }
 
 impl InputLooks {
-    /// Of a model, which keeps its triangles alone.
+    /// Takes those of a model, which keeps its triangles alone.
     pub fn take(model: &mut Model) -> Self {
         let usage = TextureUsage::of(model);
         let own = Model {
@@ -121,7 +121,7 @@ impl Collecting {
 pub struct BlockMaterials {
     /// Without triangles.
     pub model: Model,
-    /// How its materials may be treated.
+    /// This says how its materials may be treated.
     pub looks: Looks,
     folding: Folding,
     inputs: Vec<PathBuf>,

@@ -31,19 +31,19 @@ use crate::mesh::box_tree::BoxTree;
 use crate::report::build_report::Count;
 use crate::texture::{Announced, DecodedImages, SharedTextures, TextureCache};
 
-/// What building blocks takes.
+/// This builds blocks.
 pub struct Building<'a> {
     /// How.
     pub options: &'a BuildOptions,
-    /// How inputs are read.
+    /// This reads inputs.
     pub preparing: &'a Preparing<'a>,
-    /// What there is to build.
+    /// This says what is to be built.
     pub plan: &'a Plan,
-    /// Of all inputs.
+    /// These are the paths of all inputs.
     pub inputs: &'a [PathBuf],
     /// The output in the making.
     pub output: &'a OutputDir,
-    /// Where the time goes.
+    /// This counts the time of each stage.
     pub stages: &'a Stages,
     /// Is told of it.
     pub progress: &'a dyn Progress,
@@ -54,7 +54,7 @@ pub struct Building<'a> {
 /// A block whose inputs are not all there yet.
 struct Waiting<'a> {
     block: &'a PlannedBlock,
-    /// What it has of each input that is there, by the number of the input.
+    /// These are its parts of the inputs that are there, by the number of the input.
     parts: BTreeMap<usize, (Arc<InputLooks>, BlockParts)>,
     /// So many inputs are not there yet.
     left: usize,

@@ -31,13 +31,13 @@ pub fn border_file(name: &str) -> String {
     format!("{BORDERS_DIR}/{name}.border")
 }
 
-/// What has come of blocks.
+/// These are the blocks that were built or taken over.
 #[derive(Default)]
 pub struct BuiltBlocks {
     /// By cell, those of each in their order.
     pub blocks: BTreeMap<u32, Vec<BuiltBlock>>,
     /// Shared textures of earlier results, by name.
     pub reused_textures: BTreeMap<String, SharedTexture>,
-    /// Those of this build.
+    /// This build has made these.
     pub shared: SharedTextures,
 }

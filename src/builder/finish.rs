@@ -33,7 +33,7 @@ use crate::report::build_report::{
 use crate::texture::SharedTextures;
 use crate::{Error, Result, tileset};
 
-/// What the end of a build takes.
+/// This ends a build.
 pub struct Finishing<'a> {
     /// How.
     pub options: &'a BuildOptions,
@@ -41,7 +41,7 @@ pub struct Finishing<'a> {
     pub globe: Option<&'a Globe>,
     /// The output in the making.
     pub output: &'a OutputDir,
-    /// Where the time goes.
+    /// This counts the time of each stage.
     pub stages: &'a Stages,
     /// Is told of it.
     pub progress: &'a dyn Progress,

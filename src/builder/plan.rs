@@ -86,7 +86,7 @@ impl Plan {
     }
 }
 
-/// What a block depends on beside its own cell.
+/// A block depends on these beside its own cell.
 #[derive(Default)]
 struct Surroundings {
     /// The blocks of which bodies may lie here: how large these are at most decides which stay whole.
@@ -97,7 +97,7 @@ struct Surroundings {
     near: BTreeSet<usize>,
 }
 
-/// Of each block that has any input, by cell.
+/// Finds those of each block that has any input, by cell.
 fn surroundings(partition: &Partition, inputs: &[KnownInput]) -> BTreeMap<u32, Surroundings> {
     let mut all: BTreeMap<u32, Surroundings> = BTreeMap::new();
     for block in partition.blocks() {

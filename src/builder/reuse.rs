@@ -30,7 +30,7 @@ pub struct Earlier {
     pub report: BuildReport,
     /// True where its tileset is whole, and for the same place.
     pub tileset: bool,
-    /// What is known of its inputs.
+    /// This is known of its inputs.
     inputs: Vec<KnownInput>,
     /// Those, by path.
     input_of: FxHashMap<String, usize>,

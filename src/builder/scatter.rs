@@ -6,7 +6,7 @@ use rustc_hash::FxHashMap;
 use crate::builder::partition::{Bodies, CellBox, Others, Partition};
 use crate::mesh::{Model, Part};
 
-/// What a block gets of an input.
+/// A block gets these triangles of an input.
 #[derive(Debug, Default)]
 pub struct BlockParts {
     /// Triangles that are within the block, and those of bodies that are of it as a whole.

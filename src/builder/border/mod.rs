@@ -1,4 +1,4 @@
-//! What a cutting plane leaves behind: a border that both sides thin alike, and skirts.
+//! A cutting plane leaves a border behind, which both sides thin alike, and skirts.
 
 pub mod chain;
 pub(crate) mod cover;

@@ -30,7 +30,7 @@ impl SurfaceQuadric {
         self.terms
     }
 
-    /// Of these coefficients.
+    /// Makes one of these coefficients.
     pub fn from_terms(terms: [f64; 6]) -> Self {
         Self { terms }
     }

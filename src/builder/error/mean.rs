@@ -8,9 +8,9 @@ use crate::mesh::Mesh;
 
 /// A mesh that others are compared with.
 pub struct MeanDistance {
-    /// What others are measured to.
+    /// Others are measured to this surface.
     surface: Original,
-    /// From where they are measured.
+    /// They are measured from these points.
     points: Vec<Vec3>,
     constants: MeasureConstants,
 }

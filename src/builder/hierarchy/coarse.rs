@@ -71,16 +71,16 @@ struct Coarse {
     skirts: Vec<Skirt>,
 }
 
-/// What a node is simplified by.
+/// This simplifies a node.
 struct NodeLadder<'a> {
-    /// With normals of one corner welded.
+    /// The normals of each corner are welded.
     source: Mesh,
-    /// The same with its border thinned.
+    /// This is the same with its border thinned.
     mesh: Mesh,
     border: Border,
     normal_sets: Option<NormalSets>,
     spans: Vec<BorderSpan>,
-    /// Those that its thinned border needs.
+    /// Its thinned border needs so many.
     skirt_triangles: usize,
     rules: SkirtRules,
     ladder: Ladder<'a>,

@@ -1,6 +1,6 @@
 //! Where cells are divided no further.
 
-/// What a block has at most, about, where no grid says what blocks are.
+/// A block has about so much at most, where no grid says what blocks are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Most {
     /// Triangles.

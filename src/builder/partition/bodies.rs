@@ -20,10 +20,10 @@ pub struct Bodies {
     blocks: Vec<Vec<u32>>,
 }
 
-/// Of no block.
+/// This stands for no block.
 const NONE: u32 = u32::MAX;
 
-/// What is known of a body.
+/// This is known of a body.
 #[derive(Clone, Copy)]
 struct Body {
     place: CellBox,
@@ -152,19 +152,19 @@ fn open_in(
 /// Surfaces of two inputs may be one that are no farther apart than this share of a triangle's size.
 const NEAR: f64 = 0.01;
 
-/// Where other inputs have something: boxes around their triangles.
+/// Other inputs may have triangles in these boxes.
 #[derive(Default)]
 pub struct Others {
     boxes: Option<BoxTree>,
 }
 
 impl Others {
-    /// Where surfaces of other inputs may be one with those of a cluster.
+    /// Surfaces of other inputs may be one with those of a cluster in this box.
     pub fn around(cluster: &Cluster) -> CellBox {
         cluster.around.larger(NEAR * cluster.largest)
     }
 
-    /// Of all clusters of other inputs.
+    /// Takes all clusters of other inputs.
     pub fn new<'a>(clusters: impl Iterator<Item = &'a Cluster>) -> Self {
         let boxes: Vec<_> = clusters.map(|cluster| Self::around(cluster).corners()).collect();
         Self { boxes: (!boxes.is_empty()).then(|| BoxTree::new(boxes)) }

@@ -32,7 +32,7 @@ impl CellBox {
         }
     }
 
-    /// What both have.
+    /// Returns what both have.
     pub fn common(&self, other: &Self) -> Self {
         Self {
             low: std::array::from_fn(|axis| self.low[axis].max(other.low[axis])),

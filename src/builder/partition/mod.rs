@@ -70,7 +70,7 @@ const LEAST_SHARE: f64 = 1.0 / (1 << 20) as f64;
 const FEW: f64 = 0.005;
 
 impl Partition {
-    /// Of what inputs have, in any order.
+    /// Divides what inputs have, in any order.
     pub fn new(mut clusters: Vec<Cluster>, split: BlockSplit, most: Most, up: UpAxis) -> Self {
         let first = Cell { place: CellBox::ALL, split: None, triangles: 0, extent: 0.0 };
         let mut partition = Self { cells: vec![first] };
@@ -203,7 +203,7 @@ struct Dividing {
     split: BlockSplit,
     most: Most,
     up: UpAxis,
-    /// What extends over less is not divided, metres.
+    /// Anything that extends over less is not divided, metres.
     least: f64,
 }
 

@@ -28,7 +28,7 @@ impl Cluster {
     }
 }
 
-/// What is known of an input.
+/// This is known of an input.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
     /// The box around its vertices.

@@ -86,10 +86,10 @@ pub struct Ladder<'a> {
     bodies: OnceCell<Bodies>,
     has_duplicate_faces: OnceCell<bool>,
     is_one_sheet: OnceCell<bool>,
-    /// With a consistent winding, where that changes anything.
+    /// Its faces wind one way; `None` where they did before.
     oriented: OnceCell<Option<Mesh>>,
     distance: OnceCell<MeanDistance>,
-    /// From what is seen of the source, without floors, which prisms have none of.
+    /// This measures from what is seen of the source: floors are left out, since prisms have none.
     distance_seen: OnceCell<MeanDistance>,
 }
 

@@ -56,13 +56,13 @@ pub struct Uppers {
 /// The trees of a block, and the name of its files.
 #[derive(Debug, Default)]
 pub struct BlockTrees {
-    /// Of its files.
+    /// Its files are called so.
     pub names: Vec<String>,
     /// Its trees.
     pub trees: Vec<Tree<NodeRecord>>,
 }
 
-/// What nodes above blocks are built with.
+/// This builds nodes above blocks.
 pub struct UpperBuilder<'a> {
     /// How, and where to; the folder has the files of what is below.
     pub target: Target<'a>,
@@ -72,17 +72,17 @@ pub struct UpperBuilder<'a> {
     pub up: UpAxis,
     /// The cells.
     pub partition: &'a Partition,
-    /// Of the blocks' vertices.
+    /// The blocks' vertices lie on it.
     pub lattice: Lattice,
 }
 
-/// What a cell has come to.
+/// This is what a cell has become.
 struct Built {
     trees: Vec<Tree<NodeRecord>>,
     border: RecordedBorder,
 }
 
-/// What all cells add to.
+/// All cells add to these.
 struct Gathered<'a> {
     blocks: Mutex<BTreeMap<u32, BlockTrees>>,
     textures: Mutex<&'a mut BTreeMap<String, SharedTexture>>,

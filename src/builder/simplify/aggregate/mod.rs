@@ -86,12 +86,12 @@ pub struct Bodies {
     rest: Vec<[u32; 3]>,
     /// The share of the mesh's area that bodies have.
     share: f64,
-    /// Made for the first budget.
+    /// They are made for the first budget.
     footprints: OnceCell<Option<Footprints>>,
 }
 
 impl Bodies {
-    /// Those of a mesh; nothing that has a `locked` vertex is one.
+    /// Finds those of a mesh; nothing that has a `locked` vertex is one.
     pub fn of(mesh: &Mesh, locked: &[bool], rules: &BodyRules) -> Self {
         let (mut bodies, mut rest) = (Vec::new(), Vec::new());
         let (mut in_bodies, mut area) = (0.0, 0.0);
