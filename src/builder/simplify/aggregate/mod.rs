@@ -115,17 +115,16 @@ impl Bodies {
     /// or these have too many borders for so few triangles. Further budgets use the grid of the first.
     pub fn extruded(&self, mesh: &Mesh, target: usize, rules: &BodyRules) -> Option<Extruded<'_>> {
         let Self { bodies, rest, share, footprints } = self;
-        let &BodyRules { up, constants, .. } = rules;
-        if bodies.len() * constants.triangles_per_body <= target {
+        if bodies.len() * rules.constants.triangles_per_body <= target {
             return None;
         }
         // What the rest does not need is there for bodies.
         let for_bodies = (target as f64 * share).max(target as f64 - rest.len() as f64);
         let triangles_per_body = for_bodies / bodies.len() as f64;
         let most = (for_bodies as usize).max(LEAST_TRIANGLES);
-        let made = || Footprints::of(mesh, bodies, up, most, constants);
+        let made = || Footprints::of(mesh, bodies, most, rules);
         let footprints = footprints.get_or_init(made).as_ref()?;
-        let prisms = footprints.prisms(mesh, bodies, up, most, constants)?;
+        let prisms = footprints.prisms(mesh, bodies, most, rules)?;
         Some(Extruded { prisms, rest, triangles_per_body })
     }
 }

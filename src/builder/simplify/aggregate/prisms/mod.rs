@@ -23,6 +23,7 @@ pub(super) use self::body::Body;
 use self::heights::{Grid, Heights, NONE};
 use self::outlines::Outlines;
 use self::regions::{Labels, Regions};
+use super::BodyRules;
 use super::look::Look;
 use crate::builder::constants::PrismConstants;
 use crate::builder::simplify::parts::Part;
@@ -40,10 +41,10 @@ impl Footprints {
     pub fn of(
         mesh: &Mesh,
         bodies: &[(Part, Body)],
-        up: UpAxis,
         target: usize,
-        constants: &PrismConstants,
+        rules: &BodyRules,
     ) -> Option<Self> {
+        let &BodyRules { up, constants, .. } = rules;
         let footprint: f64 = bodies.iter().map(|(_, body)| body.footprint).sum();
         // The side of a square as large as the footprints have for each triangle.
         let share = (footprint / target as f64).sqrt();
@@ -58,10 +59,10 @@ impl Footprints {
         &self,
         mesh: &Mesh,
         bodies: &[(Part, Body)],
-        up: UpAxis,
         target: usize,
-        constants: &PrismConstants,
+        rules: &BodyRules,
     ) -> Option<Mesh> {
+        let &BodyRules { up, constants, .. } = rules;
         let Self { heights, regions } = self;
         let count = regions.count().min((target as f64 / TRIANGLES_EACH) as usize).max(1);
         let least = (constants.crumb * constants.resolution * constants.resolution) as usize;
