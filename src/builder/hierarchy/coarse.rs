@@ -110,13 +110,13 @@ impl<R> Outcome<R> {
     }
 }
 
-/// Cosine of the angle between a skirt's normal and an axis, at least, and how far apart its corners
-/// are along the axis, as a share of its longest edge, at most: it then lies in a cutting plane.
+/// A skirt lies in a cutting plane where the cosine of the angle between its normal and the plane's axis is
+/// at least the first, and its corners are no farther from the plane than the second times its longest edge.
 const IN_PLANE: (f64, f64) = (0.99, 0.01);
 
 /// The skirt triangles that lie in no cutting plane: from a border vertex beside the plane to the
 /// plane. They are seen as surface, so they must be near the source; but they stand for none of it.
-fn skirts_beside(mesh: &Mesh, skirts: &[Skirt]) -> Mesh {
+fn skirts_beside(mesh: &Mesh, skirts: &[Skirt], path: &Path) -> Mesh {
     let mut positions: Vec<[f32; 3]> = Vec::new();
     for Skirt { edge, corners, triangles } in skirts {
         let position = |corner: u8| match usize::from(corner) {
@@ -124,22 +124,25 @@ fn skirts_beside(mesh: &Mesh, skirts: &[Skirt]) -> Mesh {
             corner => corners[corner - 2].0,
         };
         let all = triangles.iter().map(|triangle| triangle.map(position));
-        positions.extend(all.filter(|&corners| !lies_in_plane(corners)).flatten());
+        positions.extend(all.filter(|&corners| !lies_in_plane(corners, path)).flatten());
     }
     let triangles = (0..positions.len() as u32 / 3).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]);
     Mesh { triangles: triangles.collect(), positions, ..Mesh::default() }
 }
 
-fn lies_in_plane(corners: [[f32; 3]; 3]) -> bool {
-    let [a, b, c] = corners.map(|corner| DVec3::from(corner.map(f64::from)));
+/// Walls may be parallel to an axis, too: a skirt that lies in one is surface.
+fn lies_in_plane(corners: [[f32; 3]; 3], path: &Path) -> bool {
+    let corners = corners.map(|corner| DVec3::from(corner.map(f64::from)));
+    let [a, b, c] = corners;
     let normal = (b - a).cross(c - a);
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-    let spread = a.max(b).max(c) - a.min(b).min(c);
     let (cosine, share) = IN_PLANE;
-    let along = |axis: usize| {
-        normal[axis].abs() >= cosine * normal.length() && spread[axis] <= share * longest
-    };
-    (0..3).any(along)
+    (0..path.len() as u32).any(|bit| {
+        let plane = path.plane(bit);
+        let beside = |corner: DVec3| (corner[plane.axis] - f64::from(plane.coordinate)).abs();
+        normal[plane.axis].abs() >= cosine * normal.length()
+            && corners.into_iter().all(|corner| beside(corner) <= share * longest)
+    })
 }
 
 impl<S: NodeSink> BlockBuilder<'_, S> {
@@ -161,7 +164,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             let constants = self.options.constants.measure;
             let (surface, error) = self.stages.time(Stage::Measure, || {
                 let surface = Original::of(&mesh, constants);
-                let beside = Original::of(&skirts_beside(&mesh, &skirts), constants);
+                let beside = Original::of(&skirts_beside(&mesh, &skirts, node.path), constants);
                 let error = measure(&below, &surface, &beside).error;
                 (surface, error)
             });
@@ -327,22 +330,33 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::builder::border::chain::{CutPlane, KeepRule};
 
     #[test]
-    fn skirts_beside_their_plane_are_measured_and_those_in_it_are_not() {
+    fn skirts_in_a_cutting_plane_are_not_measured_and_others_are() {
         let mesh = Mesh {
             positions: vec![[4.0, 0.0, 0.0], [4.0, 9.0, 0.0], [0.0, 0.0, 0.0]],
             materials: vec![0; 3],
             triangles: vec![[0, 1, 2]],
             ..Mesh::default()
         };
+        let rule = KeepRule {
+            shares: vec![1.0],
+            most: Vec::new(),
+            first_level: 0,
+            collinear: -1.0,
+            baked: None,
+            constants: Default::default(),
+        };
+        let at = |x: f32| Path::default().with(Arc::new(CutPlane::new(0, x, &[], &[], &rule)));
         let skirt = |x: f32| Skirt {
             edge: [0, 1],
             corners: vec![([x, 9.0, -0.5], 0)],
             triangles: vec![[0, 1, 2]],
         };
-        assert_eq!(skirts_beside(&mesh, &[skirt(4.0)]), Mesh::default());
-        let beside = skirts_beside(&mesh, &[skirt(4.0), skirt(3.0)]);
-        assert_eq!((beside.triangles.len(), beside.positions.len()), (1, 3));
+        let measured = |x: f32, path: &Path| skirts_beside(&mesh, &[skirt(x)], path);
+        assert_eq!(measured(4.0, &at(4.0)), Mesh::default());
+        assert_eq!(measured(3.0, &at(4.0)).triangles.len(), 1, "it leans away from the plane");
+        assert_eq!(measured(4.0, &at(5.0)).triangles.len(), 1, "it lies in a wall");
     }
 }
