@@ -85,8 +85,8 @@ def inputs(programs, arguments):
 def conditions(arguments):
     return (
         f"One thread, processor seconds of the fastest of {arguments.runs} build{'s' if arguments.runs > 1 else ''}. "
-        f"Errors are those of a front of at most {SHARE:.0%} of the source's triangles, cut where "
-        "the stored errors say, two-sided and in units of 1e-4 of the diagonal of the bounding "
+        f"Errors are those of a front of at most {SHARE:.0%} of the source's triangles, chosen "
+        "by the errors that viewers are given, two-sided and in units of 1e-4 of the diagonal of the bounding "
         f"box, by {arguments.samples:,} points spread over each surface (`hlod-build verify "
         f"--front {SHARE}`); *colour* is the RMS difference of 255 at the same points; *baking* is "
         "the part of the seconds that charts and textures of baked nodes took; *MB* is all that was "

@@ -43,7 +43,7 @@ def conditions():
     return (
         "*Triangles* is `--desired-tris`; *seconds* are of one processor, for a build with one "
         "thread; *front* is the RMS distance, two-sided, in 1e-4 of the diagonal, of a front of at "
-        f"most {SHARE:.0%} of the source's triangles chosen by stored errors. A walk and a flight "
+        f"most {SHARE:.0%} of the source's triangles chosen by the errors that viewers are given. A walk and a flight "
         f"of {FRAMES} frames are replayed by the model clock at {TARGET_MS} ms: the mean FLIP "
         f"against the leaves at every {COMPARED_EVERY}th frame, {PICTURE}; the frame time that 95 of "
         "100 frames keep; and what was read."

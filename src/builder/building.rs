@@ -16,6 +16,7 @@ use crate::builder::built::{BuiltBlock, BuiltBlocks};
 use crate::builder::checkpoint::Checkpoints;
 use crate::builder::cut::cell::CellCut;
 use crate::builder::inputs::text_of;
+use crate::builder::memory::{give_back, total_bytes};
 use crate::builder::options::BuildOptions;
 use crate::builder::partition::{CellBox, Others};
 use crate::builder::plan::{KnownInput, Plan, PlannedBlock};
@@ -86,11 +87,7 @@ impl Building<'_> {
             if let Some(earlier) = self.earlier
                 && let Some(numbers) = earlier.blocks(&block.name, &block.made_of)
             {
-                for &number in numbers {
-                    let triangles = earlier.report.blocks[number].triangles;
-                    earlier.take_over(number, block.cell, self.output, &mut made)?;
-                    self.progress.built(triangles);
-                }
+                earlier.take_over_all(block, numbers, self.output, self.progress, &mut made)?;
                 continue;
             }
             let left = block.inputs.len();
@@ -140,8 +137,14 @@ impl Building<'_> {
                 || next.map(read),
             );
             ahead = read_ahead;
-            for (cell, blocks) in built? {
-                made.blocks.insert(cell, blocks);
+            for (block, blocks) in built? {
+                match blocks.is_empty() {
+                    true => made.empty.push(block.empty()),
+                    false => drop(made.blocks.insert(block.cell, blocks)),
+                }
+            }
+            if self.options.max_memory.is_some() {
+                give_back();
             }
             checkpoints.finished(&made, &inputs, self.plan, self.output)?;
         }
@@ -187,12 +190,12 @@ impl Building<'_> {
     }
 
     /// Builds blocks whose inputs are there, in parallel.
-    fn build(
+    fn build<'b>(
         &self,
-        ready: Vec<Waiting>,
+        ready: Vec<Waiting<'b>>,
         shared: &SharedTextures,
         images: &DecodedImages,
-    ) -> Result<Vec<(u32, Vec<BuiltBlock>)>> {
+    ) -> Result<Vec<(&'b PlannedBlock, Vec<BuiltBlock>)>> {
         let target = Target {
             options: self.options,
             out: self.output,
@@ -200,23 +203,23 @@ impl Building<'_> {
             stages: self.stages,
             progress: self.progress,
         };
-        let drafts: Vec<(u32, Ready)> = ready
-            .into_iter()
-            .filter(|waits| !waits.parts.is_empty())
-            .map(|waits| (waits.block.cell, self.ready(waits, images)))
-            .collect();
-        in_parallel(drafts, |_, (cell, Ready { draft, materials, announced })| {
+        let drafts: Vec<(&PlannedBlock, Ready)> =
+            ready.into_iter().map(|waits| (waits.block, self.ready(waits, images))).collect();
+        in_parallel(drafts, |_, (block, Ready { draft, materials, announced })| {
+            if draft.parts.is_empty() {
+                return Ok((block, Vec::new()));
+            }
             let cache = TextureCache::new(&materials.model, &materials.looks.textures, &announced);
             let setup = BlockSetup::new(target, self.plan.up, &cache, &materials.looks.extrudable);
             let builder =
                 DraftBuilder { materials: &materials, setup: &setup, lattice: self.plan.lattice };
             let mut built = builder.build(draft)?;
-            if let Some(block) = built.first_mut() {
+            if let Some(first) = built.first_mut() {
                 let warnings = cache.warnings_of(|texture| materials.input_of(texture));
                 let texts = warnings.iter().map(|(text, _)| text.to_owned());
-                block.report.texture_warnings.extend(texts);
+                first.report.texture_warnings.extend(texts);
             }
-            Ok((cell, built))
+            Ok((block, built))
         })
     }
 
@@ -259,7 +262,7 @@ impl Building<'_> {
         let both = bytes(current) + bytes(next);
         match self.options.max_memory {
             Some(memory) => both <= memory / 4,
-            None => both <= crate::builder::memory::total_bytes() / 16,
+            None => both <= total_bytes() / 16,
         }
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::hierarchy::Tree;
 use crate::format::{BORDERS_DIR, BlockInfo, SharedTexture};
-use crate::report::build_report::BlockReport;
+use crate::report::build_report::{BlockReport, EmptyBlock};
 use crate::texture::SharedTextures;
 
 /// A block whose nodes are written.
@@ -36,6 +36,8 @@ pub fn border_file(name: &str) -> String {
 pub struct BuiltBlocks {
     /// By cell, those of each in their order.
     pub blocks: BTreeMap<u32, Vec<BuiltBlock>>,
+    /// Those of which nothing is left.
+    pub empty: Vec<EmptyBlock>,
     /// Shared textures of earlier results, by name.
     pub reused_textures: BTreeMap<String, SharedTexture>,
     /// This build has made these.

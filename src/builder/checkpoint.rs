@@ -84,6 +84,7 @@ impl<'a> Checkpoints<'a> {
             baked: baked(&trees),
             inputs: inputs.iter().map(|input| input.report.clone()).collect(),
             blocks,
+            empty_blocks: made.empty.clone(),
             ..BuildReport::default()
         };
         let textures = made.reused_textures.clone();

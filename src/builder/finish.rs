@@ -64,7 +64,8 @@ impl Finishing<'_> {
         made: BuiltBlocks,
     ) -> Result<BuildReport> {
         let Self { options, output, stages, progress, earlier, parameters, subset, .. } = self;
-        let BuiltBlocks { blocks, reused_textures, shared } = made;
+        let BuiltBlocks { blocks, empty: mut empty_blocks, reused_textures, shared } = made;
+        empty_blocks.sort_unstable();
         let mut shared_textures = write_textures(shared, reused_textures, output)?;
         let Blocks { infos, reports: blocks, trees: of_blocks } = Blocks::of(blocks);
         let mut warnings = warnings(&inputs, &blocks, plan, earlier, self.globe);
@@ -124,6 +125,7 @@ impl Finishing<'_> {
             outcomes: most_frequent(blocks.iter().flat_map(|block| &block.outcomes).cloned()),
             inputs,
             blocks,
+            empty_blocks,
             tilesets,
             quantized: quantization.map(|quantization| quantized(&scene, quantization)),
             over_budget,

@@ -37,8 +37,10 @@ impl Subsets {
                 let what = "expected a whole result, found files missing, or of another size";
                 Error::input(&dir, format!("{what}; run hlod-build --subset {subset} again"))
             })?;
-            let blocks = result.report.blocks.iter().map(|block| block.name.clone());
-            of_blocks.extend(blocks.map(|block| (block, results.len())));
+            let BuildReport { blocks, empty_blocks, .. } = &result.report;
+            let names = blocks.iter().map(|block| &block.name);
+            let names = names.chain(empty_blocks.iter().map(|block| &block.name));
+            of_blocks.extend(names.map(|block| (block.clone(), results.len())));
             results.push(result);
         }
         Ok(Self { results, of_blocks })
@@ -54,7 +56,7 @@ impl Subsets {
         self.results[0].inputs()
     }
 
-    /// The result that has a block, if any triangle of it is left, and the block's numbers there.
+    /// The result that has a block, and the block's numbers there.
     pub fn blocks(&self, name: &str, made_of: &str) -> Option<(&Earlier, &[usize])> {
         let result = &self.results[*self.of_blocks.get(name)?];
         Some((result, result.blocks(name, made_of)?))

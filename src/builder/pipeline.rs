@@ -84,11 +84,9 @@ pub fn merge_subsets(out: &Path, progress: &dyn Progress) -> Result<BuildReport>
         let Some((earlier, numbers)) = subsets.blocks(&block.name, &block.made_of) else {
             continue;
         };
-        for &number in numbers {
-            progress.found(earlier.report.blocks[number].triangles);
-            earlier.take_over(number, block.cell, &output, &mut made)?;
-            progress.built(earlier.report.blocks[number].triangles);
-        }
+        let triangles = numbers.iter().map(|&number| earlier.report.blocks[number].triangles);
+        progress.found(triangles.sum());
+        earlier.take_over_all(block, numbers, &output, progress, &mut made)?;
     }
     progress.finishing();
     let earlier = Earlier::open(out, &parameters);

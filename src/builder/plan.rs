@@ -9,7 +9,7 @@ use crate::builder::partition::{CellBox, Most, Others, Partition, Scan};
 use crate::format::Subset;
 use crate::lattice::Lattice;
 use crate::mesh::UpAxis;
-use crate::report::build_report::InputReport;
+use crate::report::build_report::{EmptyBlock, InputReport};
 use crate::{Error, Result};
 
 /// An input that was looked at.
@@ -32,6 +32,13 @@ pub struct PlannedBlock {
     pub inputs: Vec<usize>,
     /// A hash of all that it is made of.
     pub made_of: String,
+}
+
+impl PlannedBlock {
+    /// This, where nothing is left of it.
+    pub fn empty(&self) -> EmptyBlock {
+        EmptyBlock { name: self.name.clone(), made_of: self.made_of.clone() }
+    }
 }
 
 /// What is to be built.

@@ -12,7 +12,8 @@ use crate::builder::built::{BuiltBlock, border_file};
 use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::hierarchy::Tree;
 use crate::builder::options::same_nodes;
-use crate::builder::plan::KnownInput;
+use crate::builder::plan::{KnownInput, PlannedBlock};
+use crate::builder::progress::Progress;
 use crate::builder::scans::known_inputs;
 use crate::format::attributes::Attributes;
 use crate::format::{
@@ -92,6 +93,9 @@ impl Earlier {
         for (number, block) in report.blocks.iter().enumerate() {
             block_of.entry(block.made_of.clone()).or_default().push(number);
         }
+        for block in &report.empty_blocks {
+            block_of.entry(block.made_of.clone()).or_default();
+        }
         let inputs = known_inputs(dir, &report.inputs)?;
         let paths = inputs.iter().map(|input| input.report.path.clone());
         let uppers = report.above.iter().map(|upper| upper.file.clone());
@@ -126,15 +130,34 @@ impl Earlier {
         &self.inputs
     }
 
-    /// The blocks of a name that are made of this, and what lies far off beside it.
+    /// The blocks of a name that are made of this, and what lies far off beside it; none of one that is empty.
     pub fn blocks(&self, name: &str, made_of: &str) -> Option<&[usize]> {
         let numbers = self.block_of.get(made_of)?;
         let is_of = |&number: &usize| self.report.blocks[number].name.starts_with(name);
         numbers.iter().all(is_of).then_some(numbers)
     }
 
+    /// Takes over [blocks](Self::blocks) that a planned one has become.
+    pub fn take_over_all(
+        &self,
+        block: &PlannedBlock,
+        numbers: &[usize],
+        output: &OutputDir,
+        progress: &dyn Progress,
+        made: &mut BuiltBlocks,
+    ) -> Result<()> {
+        if numbers.is_empty() {
+            made.empty.push(block.empty());
+        }
+        for &number in numbers {
+            self.take_over(number, block.cell, output, made)?;
+            progress.built(self.report.blocks[number].triangles);
+        }
+        Ok(())
+    }
+
     /// Links the files of a block into the new output.
-    pub fn take_over(
+    fn take_over(
         &self,
         number: usize,
         cell: u32,

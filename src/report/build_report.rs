@@ -28,6 +28,9 @@ pub struct BuildReport {
     pub inputs: Vec<InputReport>,
     /// Its blocks, in the order of the scene's.
     pub blocks: Vec<BlockReport>,
+    /// Planned blocks of which nothing is left: all that is there stays whole on the other side of a cut.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub empty_blocks: Vec<EmptyBlock>,
     /// Triangles of all inputs after import.
     pub source_triangles: u64,
     /// Different texels of the source that its triangles use.
@@ -80,6 +83,15 @@ pub struct UpperReport {
     /// Its file.
     pub file: String,
     /// BLAKE3 of all that it is made of, in hexadecimal: the files below it and its borders.
+    pub made_of: String,
+}
+
+/// A planned block without a triangle.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct EmptyBlock {
+    /// What the names of its files would begin with.
+    pub name: String,
+    /// BLAKE3 of all that it is made of, in hexadecimal.
     pub made_of: String,
 }
 

@@ -33,20 +33,22 @@ impl Front {
         Self::new(scene, nodes)
     }
 
-    /// The front that comes from the roots by replacing the node of the largest stored error by
-    /// its children, again and again, as long as it has at most `most_triangles`. The roots stay
-    /// where they alone have more.
+    /// The front that comes from the roots by replacing the node of the largest
+    /// [viewer's error](Scene::viewer_errors) by its children, again and again, as long as it has at most
+    /// `most_triangles`. The roots stay where they alone have more.
     pub fn of_size(scene: &Scene, most_triangles: u64) -> Self {
+        let errors = scene.viewer_errors();
+        let ranked = |node: u32| {
+            let error = if is_leaf(scene, node) { -1.0 } else { errors[node as usize] };
+            Ranked { error, node }
+        };
         let triangles = |node: u32| u64::from(scene.nodes[node as usize].triangles);
-        let roots = (0..scene.nodes.len() as u32)
-            .filter(|&node| scene.nodes[node as usize].parent.is_none());
-        let mut open: BinaryHeap<ByError> = roots.map(|node| ByError::of(scene, node)).collect();
+        let mut open: BinaryHeap<Ranked> = scene.roots().map(ranked).collect();
         let mut total: u64 = open.iter().map(|entry| triangles(entry.node)).sum();
         let mut nodes = Vec::new();
-        while let Some(ByError { node, .. }) = open.pop() {
-            let children: Vec<u32> = children(scene, node).collect();
-            let more = children.iter().map(|&child| triangles(child)).sum::<u64>();
-            if children.is_empty() {
+        while let Some(Ranked { node, .. }) = open.pop() {
+            let more = scene.children(node).map(triangles).sum::<u64>();
+            if is_leaf(scene, node) {
                 nodes.push(node);
                 continue;
             }
@@ -55,7 +57,7 @@ impl Front {
                 break;
             }
             total = total + more - triangles(node);
-            open.extend(children.into_iter().map(|child| ByError::of(scene, child)));
+            open.extend(scene.children(node).map(ranked));
         }
         nodes.extend(open.into_iter().map(|entry| entry.node));
         nodes.sort_unstable();
@@ -78,44 +80,31 @@ impl Front {
     }
 }
 
-fn children(scene: &Scene, node: u32) -> impl Iterator<Item = u32> {
-    let first = scene.nodes[node as usize].first_child;
-    std::iter::successors(first, |&child| scene.nodes[child as usize].next_sibling)
-}
-
-/// A node by its stored error, leaves last; equal ones by number.
-struct ByError {
+/// A node by its error, leaves last; equal ones by number.
+struct Ranked {
     error: f64,
     node: u32,
 }
 
-impl ByError {
-    fn of(scene: &Scene, node: u32) -> Self {
-        let error =
-            if is_leaf(scene, node) { -1.0 } else { scene.nodes[node as usize].geometric_error };
-        Self { error, node }
-    }
-}
-
-impl Ord for ByError {
+impl Ord for Ranked {
     fn cmp(&self, other: &Self) -> Ordering {
         self.error.total_cmp(&other.error).then_with(|| other.node.cmp(&self.node))
     }
 }
 
-impl PartialOrd for ByError {
+impl PartialOrd for Ranked {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for ByError {
+impl PartialEq for Ranked {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for ByError {}
+impl Eq for Ranked {}
 
 #[cfg(test)]
 mod tests {
@@ -158,5 +147,29 @@ mod tests {
                 assert_eq!(above, 1, "{size}: {leaf}");
             }
         }
+    }
+
+    #[test]
+    fn nodes_are_refined_in_the_order_of_viewers() {
+        let mut scene = scene();
+        let below = |scene: &Scene, root: u32| scene.children(root).next().unwrap();
+        // Two trees of two levels: 0 above 1 and 3 above 4.
+        scene.nodes.truncate(4);
+        for (number, node) in (0u32..).zip(&mut scene.nodes) {
+            let is_root = number % 2 == 0;
+            (node.parent, node.first_child) = match is_root {
+                true => (None, Some(number + 1)),
+                false => (Some(number - 1), None),
+            };
+            (node.level, node.triangles) = (number % 2, if is_root { 10 } else { 20 });
+            let error = if is_root { 1.0 } else { 0.0 };
+            (node.mean_error, node.p95_error, node.geometric_error) = (0.0, error, 4.0 * error);
+        }
+        (scene.nodes[0].next_sibling, scene.nodes[1].next_sibling) = (Some(2), None);
+        (scene.nodes[2].next_sibling, scene.nodes[3].next_sibling) = (None, None);
+        // One point of the first is far off; most of the second is.
+        scene.nodes[0].geometric_error = 50.0;
+        (scene.nodes[2].p95_error, scene.nodes[2].geometric_error) = (2.0, 8.0);
+        assert_eq!(nodes(&Front::of_size(&scene, 30)), [0, below(&scene, 2)]);
     }
 }

@@ -4,7 +4,11 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
+use hlod::builder::BuildOptions;
+use hlod::builder::partition::BlockSplit;
+use hlod::builder::progress::Progress;
 use hlod::city::{self, CityOptions};
 use hlod::format::{Scene, TEXTURES_DIR};
 use hlod::mesh::UpAxis;
@@ -112,6 +116,49 @@ fn a_touched_but_unchanged_input_is_unchanged() {
     let input = folder.path().join("parts/block_0001.obj");
     fs::write(&input, fs::read(&input).unwrap()).unwrap();
     assert!(is_up_to_date(&build(folder.path(), &["parts", "out"])));
+}
+
+/// Of one block there is nothing but a side of a small box, which stays whole in the next.
+#[test]
+fn what_an_empty_block_is_made_of_is_not_read_again() {
+    struct Read(Mutex<Vec<String>>);
+    impl Progress for Read {
+        fn reading(&self, input: &Path, _: usize, _: usize) {
+            let name = input.file_name().unwrap().to_string_lossy().into_owned();
+            self.0.lock().unwrap().push(name);
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let ground = |x: f64, size: f64| {
+        let square = |number: u32| {
+            let low = [x + f64::from(number % 40) * size, f64::from(number / 40) * size];
+            let corners = [[0.0, 0.0], [size, 0.0], [size, size], [0.0, size]];
+            let corners = corners.map(|[i, j]| format!("v {} {} 0\n", low[0] + i, low[1] + j));
+            format!("{}f -4 -3 -2 -1\n", corners.concat())
+        };
+        (0..1600).map(square).collect::<String>()
+    };
+    let corners = (0..8).map(|number| {
+        let at = |bit: usize, low: f64| if number >> bit & 1 == 0 { low } else { low + 0.8 };
+        format!("v {} {} {}\n", at(0, 9.7), at(1, 4.0), at(2, 2.0))
+    });
+    let sides = "f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
+    let near = format!("{}{sides}{}", corners.collect::<String>(), ground(11.0, 0.2));
+    write(folder.path(), "near.obj", near);
+    write(folder.path(), "far.obj", ground(91.0, 0.21));
+    let options = BuildOptions { blocks: BlockSplit::Grid(10.0), ..BuildOptions::default() };
+    let inputs = [folder.path().join("near.obj"), folder.path().join("far.obj")];
+    let out = folder.path().join("out");
+    let build = || {
+        let read = Read(Mutex::default());
+        hlod::builder::build(&inputs, &out, &options, &read).unwrap();
+        read.0.into_inner().unwrap()
+    };
+    assert_eq!(build(), ["far.obj", "near.obj"]);
+    assert_eq!(report(&out)["empty_blocks"].as_array().map(Vec::len), Some(1));
+    write(folder.path(), "far.obj", ground(91.0, 0.22));
+    assert_eq!(build(), ["far.obj"]);
+    assert_eq!(report(&out)["empty_blocks"].as_array().map(Vec::len), Some(1));
 }
 
 #[test]

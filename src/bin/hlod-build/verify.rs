@@ -33,8 +33,8 @@ pub struct VerifyArgs {
     /// Seed of the sample points: the same seed gives the same figures
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Also measure a front of mixed levels, chosen by the stored errors, of at most this fraction
-    /// of the leaves' triangles, above 0 and up to 1
+    /// Also measure a front of mixed levels, chosen by the errors that viewers are given, of at most
+    /// this fraction of the leaves' triangles, above 0 and up to 1
     #[arg(long, value_name = "SHARE")]
     front: Option<f64>,
     /// Cells of which faces are drawn, at most, from corners that no picture was taken from; 0 draws none
