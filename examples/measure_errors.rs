@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use hlod::builder::border::vertex::{self, Border};
 use hlod::builder::constants::Constants;
-use hlod::builder::error::{Below, Original, measure};
+use hlod::builder::error::{Below, SearchableSurface, measure};
 use hlod::builder::gather::gather;
 use hlod::builder::simplify::ladder::{AppearanceWeights, Ladder, Method, Simplifier};
 use hlod::mesh::{Mesh, UpAxis};
@@ -61,11 +61,11 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let simplified =
                     Ladder::new(chunk, &border, &path, 0, method).simplified(target).mesh;
                 let begin = Instant::now();
-                let below = Below::source(Original::of(chunk, constants.measure), 0.0);
+                let below = Below::source(SearchableSurface::of(chunk, constants.measure), 0.0);
                 made += begin.elapsed();
                 let begin = Instant::now();
-                let node = Original::of(&simplified, constants.measure);
-                let none = Original::of(&Mesh::default(), constants.measure);
+                let node = SearchableSurface::of(&simplified, constants.measure);
+                let none = SearchableSurface::of(&Mesh::default(), constants.measure);
                 let result = measure(&below, &node, &none);
                 measured += begin.elapsed();
                 triangles += chunk.triangles.len();

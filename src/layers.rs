@@ -57,8 +57,8 @@ fn name_of(text: &str) -> String {
     text.chars().take_while(|&letter| letter.is_alphanumeric() || letter == '_').collect()
 }
 
-/// What is wrong: a module without a layer, or one that uses another that is not below it. `code` has
-/// the modules' files, each with the module's name.
+/// Lists modules without a layer, and modules that use one that is not below them. `code` has the source
+/// files, each with its module's name.
 fn faults(
     layers: &BTreeMap<String, usize>,
     code: &[(String, String)],

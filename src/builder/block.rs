@@ -13,7 +13,9 @@ use crate::builder::cut::section::Triangle;
 use crate::builder::cut::split::Chunk;
 use crate::builder::emit::disk_sink::{NodeRecord, file_name};
 use crate::builder::gather::{gather, localise};
-use crate::builder::hierarchy::{BorderMode, Forest, HierarchyOptions, LeftOut, Resolutions, Tree};
+use crate::builder::hierarchy::{
+    BorderMode, Forest, HierarchyOptions, Resolutions, SkippedNode, Tree,
+};
 use crate::builder::outliers::set_outliers_aside;
 use crate::builder::partition::CellBox;
 use crate::builder::scatter::BlockParts;
@@ -23,7 +25,7 @@ use crate::builder::stitch::{OpenEdge, stitches};
 use crate::format::BlockInfo;
 use crate::lattice::Lattice;
 use crate::mesh::{Normal, Part, Warnings, key};
-use crate::report::build_report::{BlockReport, Count, LeftOutNode, most_frequent};
+use crate::report::build_report::{BlockReport, Count, SkippedNodeReport, most_frequent};
 use crate::texture::BakeReason;
 
 /// Steps of simplification that borders between blocks are ranked for.
@@ -39,14 +41,14 @@ pub struct BlockLabel {
     /// The input that it has most triangles of.
     pub input: String,
     /// A hash of all that it is made of.
-    pub made_of: String,
+    pub content_hash: String,
 }
 
 /// A block about to be built.
 pub struct Draft {
     /// This identifies it.
     pub label: BlockLabel,
-    /// Its triangles of all inputs; their materials are those of its [`BlockMaterials`].
+    /// Triangles of the block from all inputs. Material numbers index its [`BlockMaterials`].
     pub parts: BlockParts,
     /// This cuts triangles at the sides of its cell.
     pub cut: CellCut,
@@ -168,16 +170,16 @@ impl DraftBuilder<'_> {
             target.progress.built(collapsed);
             return Ok(None);
         }
-        let BlockLabel { files, name, input, made_of } = label;
+        let BlockLabel { files, name, input, content_hash } = label;
         let place = BlockPlace { prefix: files.clone(), origin, lattice };
         let textures = self.setup.textures(&chunk.mesh, &resolutions);
         let sink = self.setup.sink(&textures, &place);
         let builder = self.setup.builder(&sink, resolutions, lattice);
         let Forest { trees, left_out } = builder.build(chunk)?;
         target.out.write(border_file(&files), &border.to_bytes())?;
-        let mut left_out: Vec<LeftOutNode> = left_out
+        let mut left_out: Vec<SkippedNodeReport> = left_out
             .into_iter()
-            .map(|LeftOut { child_path, triangles, kept }| LeftOutNode {
+            .map(|SkippedNode { child_path, triangles, kept }| SkippedNodeReport {
                 file: file_name(&files, &child_path),
                 triangles,
                 kept,
@@ -187,7 +189,7 @@ impl DraftBuilder<'_> {
         let outcomes = outcomes(&trees, &mut warnings);
         let report = BlockReport {
             name: files,
-            made_of,
+            content_hash,
             triangles,
             texels: textures.used_texels(),
             repeating: textures.repeating(),
@@ -213,8 +215,9 @@ impl DraftBuilder<'_> {
         cut.sides().iter().map(|side| FaceBorder::new(side, &triangles, &rule)).collect()
     }
 
-    /// As within blocks: triangles go to a share for each step and the length of borders to its root. The
-    /// steps are counted from the leaves, where all blocks are alike.
+    /// Returns the rule that ranks border vertices at planes between blocks. Each level keeps 1 / level factor
+    /// of the triangles, so the square root of that of a border's vertices. Levels are counted from the leaves,
+    /// where all blocks are alike.
     fn keep_rule(&self) -> KeepRule<'static> {
         let HierarchyOptions { borders, level_factor, constants, .. } =
             &self.setup.target().options.hierarchy;
@@ -251,7 +254,7 @@ fn piece(part: &Part, cut: &CellCut, lattice: Lattice) -> Part {
             continue;
         }
         let first = own.positions.len() as u32;
-        // In an order of its own, so that what two triangles have in common is one from both.
+        // Corners are sorted, so that two triangles compute the same values for what they share.
         let mut order = [0, 1, 2];
         order.sort_by_key(|&corner| key(positions[corner]));
         for place in &cut.places {

@@ -6,20 +6,20 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::builder::block_setup::Looks;
+use crate::builder::block_setup::Appearances;
 use crate::builder::folding::Folding;
 use crate::mesh::{Material, Model, Part, TextureData, TextureSource, Warnings};
 use crate::texture::{TexturePlan, TextureUsage};
 
 /// The materials and textures of an input, and how all of its triangles use these.
 #[derive(Debug)]
-pub struct InputLooks {
+pub struct InputAppearance {
     /// Without triangles.
     pub model: Model,
     usage: TextureUsage,
 }
 
-impl InputLooks {
+impl InputAppearance {
     /// Takes those of a model, which keeps its triangles alone.
     pub fn take(model: &mut Model) -> Self {
         let usage = TextureUsage::of(model);
@@ -42,9 +42,9 @@ impl InputLooks {
 pub struct Collecting {
     materials: Vec<Material>,
     textures: Vec<TextureSource>,
-    /// By look, without the name.
+    /// Material number by appearance (all properties but the name).
     looks: BTreeMap<String, u32>,
-    /// By file and opacity: textures of files.
+    /// Texture number by file and opacity file.
     files: BTreeMap<(PathBuf, Option<PathBuf>), u32>,
     /// The input that each texture was first met in.
     inputs: Vec<PathBuf>,
@@ -54,8 +54,8 @@ pub struct Collecting {
 
 impl Collecting {
     /// Adds those of an input, of which a block has some parts, and gives the parts their numbers here.
-    pub fn add<'a>(&mut self, looks: &InputLooks, parts: impl Iterator<Item = &'a mut Part>) {
-        let InputLooks { model, usage } = looks;
+    pub fn add<'a>(&mut self, looks: &InputAppearance, parts: impl Iterator<Item = &'a mut Part>) {
+        let InputAppearance { model, usage } = looks;
         let textures: Vec<u32> =
             model.textures.iter().map(|texture| self.texture(texture, &model.source)).collect();
         self.usage.add(usage, &textures);
@@ -111,7 +111,7 @@ impl Collecting {
             up: None,
             warnings: Warnings::default(),
         };
-        let looks = Looks::of(&model, TexturePlan::of_usage(&model, usage));
+        let looks = Appearances::of(&model, TexturePlan::of_usage(&model, usage));
         BlockMaterials { model, looks, folding, inputs: self.inputs }
     }
 }
@@ -122,7 +122,7 @@ pub struct BlockMaterials {
     /// Without triangles.
     pub model: Model,
     /// This says how its materials may be treated.
-    pub looks: Looks,
+    pub looks: Appearances,
     folding: Folding,
     inputs: Vec<PathBuf>,
 }

@@ -32,7 +32,7 @@ pub struct Target<'a> {
 
 /// How the materials of a model may be treated.
 #[derive(Debug)]
-pub struct Looks {
+pub struct Appearances {
     /// Which textures are cut up.
     pub textures: TexturePlan,
     /// Which materials may lose their seams.
@@ -41,7 +41,7 @@ pub struct Looks {
     pub extrudable: Extrudable,
 }
 
-impl Looks {
+impl Appearances {
     /// Of a model whose untextured materials are merged.
     pub fn new(model: &Model) -> Self {
         Self::of(model, TexturePlan::new(model))

@@ -10,7 +10,7 @@ use rustc_hash::FxHashMap;
 
 use crate::Result;
 use crate::builder::block::{BlockLabel, Draft, DraftBuilder};
-use crate::builder::block_materials::{BlockMaterials, Collecting, InputLooks};
+use crate::builder::block_materials::{BlockMaterials, Collecting, InputAppearance};
 use crate::builder::block_setup::{BlockSetup, Target};
 use crate::builder::built::{BuiltBlock, BuiltBlocks};
 use crate::builder::checkpoint::Checkpoints;
@@ -22,7 +22,7 @@ use crate::builder::partition::{CellBox, Others};
 use crate::builder::plan::{KnownInput, Plan, PlannedBlock};
 use crate::builder::prepare::{Prepared, Preparing};
 use crate::builder::progress::Progress;
-use crate::builder::reuse::Earlier;
+use crate::builder::reuse::PreviousBuild;
 use crate::builder::scatter::{BlockParts, scatter};
 use crate::builder::stages::{Stage, Stages};
 use crate::builder::threads::in_parallel;
@@ -34,7 +34,7 @@ use crate::texture::{Announced, DecodedImages, SharedTextures, TextureCache};
 
 /// This builds blocks.
 pub struct Building<'a> {
-    /// How.
+    /// Options of the build.
     pub options: &'a BuildOptions,
     /// This reads inputs.
     pub preparing: &'a Preparing<'a>,
@@ -49,15 +49,15 @@ pub struct Building<'a> {
     /// Is told of it.
     pub progress: &'a dyn Progress,
     /// A result whose blocks are taken over where they are made of the same.
-    pub earlier: Option<&'a Earlier>,
+    pub earlier: Option<&'a PreviousBuild>,
 }
 
 /// A block whose inputs are not all there yet.
 struct Waiting<'a> {
     block: &'a PlannedBlock,
     /// These are its parts of the inputs that are there, by the number of the input.
-    parts: BTreeMap<usize, (Arc<InputLooks>, BlockParts)>,
-    /// So many inputs are not there yet.
+    parts: BTreeMap<usize, (Arc<InputAppearance>, BlockParts)>,
+    /// Number of inputs that are not read yet.
     left: usize,
 }
 
@@ -80,14 +80,14 @@ impl Building<'_> {
     ) -> Result<(BuiltBlocks, Vec<KnownInput>)> {
         let mut made = BuiltBlocks::default();
         let mut waiting: BTreeMap<u32, Waiting> = BTreeMap::new();
-        // In the order of blocks, so that few wait at a time whatever inputs are called.
+        // Inputs are read in the order of blocks, so that few blocks wait at a time.
         let mut wanted: Vec<usize> = Vec::new();
         let mut blocks_of: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
         for block in &self.plan.blocks[share] {
             if let Some(earlier) = self.earlier
-                && let Some(numbers) = earlier.blocks(&block.name, &block.made_of)
+                && let Some(numbers) = earlier.blocks(&block.name, &block.content_hash)
             {
-                earlier.take_over_all(block, numbers, self.output, self.progress, &mut made)?;
+                earlier.reuse_blocks(block, numbers, self.output, self.progress, &mut made)?;
                 continue;
             }
             let left = block.inputs.len();
@@ -151,7 +151,7 @@ impl Building<'_> {
         Ok((made, inputs))
     }
 
-    /// What other inputs have near one; `places` are those where each may have something.
+    /// Returns the clusters of other inputs near an input. `places` has the box of each input.
     fn others(&self, input: usize, inputs: &[KnownInput], places: &BoxTree) -> Others {
         let bounds = inputs[input].scan.bounds;
         let meets = |&[low, high]: &[[f64; 3]; 2]| bounds.meets(&CellBox { low, high });
@@ -167,7 +167,7 @@ impl Building<'_> {
         prepared: Prepared,
         known: &mut KnownInput,
         others: &Others,
-    ) -> (Arc<InputLooks>, FxHashMap<u32, BlockParts>) {
+    ) -> (Arc<InputAppearance>, FxHashMap<u32, BlockParts>) {
         let Prepared { mut model, .. } = prepared;
         let step = self.plan.lattice.step;
         let collapsed = self.stages.time(Stage::Gather, || Quantization { step }.snap(&mut model));
@@ -181,7 +181,7 @@ impl Building<'_> {
         model.warnings.add(what, collapsed);
         self.progress.built(collapsed);
         known.report.warnings = Count::of_warnings(&model.warnings);
-        let looks = self.stages.time(Stage::Gather, || InputLooks::take(&mut model));
+        let looks = self.stages.time(Stage::Gather, || InputAppearance::take(&mut model));
         let uncut = self.options.hierarchy.constants.blocks.uncut;
         let most = self.options.most_in_block() as usize / uncut.max(1);
         let parts =
@@ -246,9 +246,9 @@ impl Building<'_> {
         let used = parts.inner.iter().chain(&parts.crossing).map(|part| part.material);
         let announced = images.announce(&materials.model, &materials.looks.textures, used);
         let (_, name, input) = largest;
-        let (files, made_of) = (block.name.clone(), block.made_of.clone());
+        let (files, content_hash) = (block.name.clone(), block.content_hash.clone());
         let draft = Draft {
-            label: BlockLabel { files, name, input, made_of },
+            label: BlockLabel { files, name, input, content_hash },
             parts,
             cut: CellCut::new(&self.plan.partition, block.cell),
         };

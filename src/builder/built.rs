@@ -11,11 +11,11 @@ use crate::texture::SharedTextures;
 /// A block whose nodes are written.
 #[derive(Clone, Debug)]
 pub struct BuiltBlock {
-    /// For `scene.hlod`.
+    /// Entry of `scene.hlod`.
     pub info: BlockInfo,
-    /// Its nodes: one tree, or several where roots are left out.
+    /// Node trees: one, or several if coarse nodes at the top were skipped.
     pub trees: Vec<Tree<NodeRecord>>,
-    /// For `build.json`.
+    /// Entry of `build.json`.
     pub report: BlockReport,
 }
 
@@ -34,9 +34,9 @@ pub fn border_file(name: &str) -> String {
 /// These are the blocks that were built or taken over.
 #[derive(Default)]
 pub struct BuiltBlocks {
-    /// By cell, those of each in their order.
+    /// Blocks by cell number, those of a cell in order.
     pub blocks: BTreeMap<u32, Vec<BuiltBlock>>,
-    /// Those of which nothing is left.
+    /// Planned blocks without a triangle.
     pub empty: Vec<EmptyBlock>,
     /// Shared textures of earlier results, by name.
     pub reused_textures: BTreeMap<String, SharedTexture>,

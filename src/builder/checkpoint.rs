@@ -27,7 +27,7 @@ pub struct Checkpoints<'a> {
 }
 
 impl<'a> Checkpoints<'a> {
-    /// Of a build with these options.
+    /// Creates the state of a build that has just begun.
     pub fn new(options: &'a BuildOptions) -> Self {
         Self { options, written: Instant::now(), took: Duration::ZERO }
     }

@@ -32,15 +32,15 @@ pub struct Constants {
     pub measure: MeasureConstants,
 }
 
-/// How inputs become blocks ([`crate::builder::partition`]); sizes in budgets, which are
+/// Constants of the partition into blocks ([`crate::builder::partition`]). Sizes are in budgets of
 /// `desired_tris` triangles each.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BlockConstants {
     /// Blocks have at most so many budgets, 1 or more (the thesis's have 87 on average).
     pub divided: usize,
-    /// And at most so many texels of the source, where these are spread evenly over the triangles that
-    /// have them: all of its images are in memory at once.
+    /// Source texels of a block at most, if each texture is spread evenly over its triangles. All images of
+    /// a block are in memory at once.
     pub texels: u64,
     /// A separate body with at most the triangles of a block divided by this is not cut, 1 or more.
     pub uncut: usize,
@@ -208,16 +208,16 @@ pub struct PrismConstants {
     /// Gaps may be filled that are at most so many times as wide as that square, 0 or more.
     pub gap: f64,
     /// A region that is given up counts so many times what is changed, 1 or more.
-    pub net: f64,
+    pub footprint_penalty: f64,
     /// Heights of a body that rise by more than this from cell to cell, as a share of a cell's
     /// side, are regions of their own, over 0.
     pub slope: f64,
     /// Holes and what is left of regions beside their largest part go to a neighbour up to this
     /// share of that square, 0 or more.
-    pub crumb: f64,
+    pub min_region: f64,
     /// A roof is by so many standard deviations of the heights that it stands for above their
     /// mean, 0 or more: a gable's ridge is part of the skyline.
-    pub raise: f64,
+    pub roof_deviations: f64,
     /// A body is at least so high for the side of a square as large as its footprint, 0 or more: a
     /// sloping road is not.
     pub least_height: f64,
@@ -235,10 +235,10 @@ impl Default for PrismConstants {
             sure: 4.0,
             resolution: 5.0,
             gap: 2.0,
-            net: 10.0,
+            footprint_penalty: 10.0,
             slope: 1.0,
-            crumb: 0.5,
-            raise: 0.5,
+            min_region: 0.5,
+            roof_deviations: 0.5,
             least_height: 0.1,
             least_walls: 0.3,
             wall_rise: 0.5,

@@ -1,4 +1,4 @@
-//! What belongs to no block: nodes above them, shared textures, tileset, scene and report.
+//! Writes the results that belong to no block: upper levels, shared textures, tileset, scene and report.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
@@ -14,7 +14,7 @@ use crate::builder::inputs::fingerprint;
 use crate::builder::options::BuildOptions;
 use crate::builder::plan::{KnownInput, Plan};
 use crate::builder::progress::Progress;
-use crate::builder::reuse::Earlier;
+use crate::builder::reuse::PreviousBuild;
 use crate::builder::scans::scans_to_bytes;
 use crate::builder::simplify::ladder::BUDGET_TOLERANCE;
 use crate::builder::stages::{Stage, Stages};
@@ -35,9 +35,9 @@ use crate::{Error, Result, tileset};
 
 /// This ends a build.
 pub struct Finishing<'a> {
-    /// How.
+    /// Options of the build.
     pub options: &'a BuildOptions,
-    /// Where the city is.
+    /// Position of the city on the globe.
     pub globe: Option<&'a Globe>,
     /// The output in the making.
     pub output: &'a OutputDir,
@@ -46,7 +46,7 @@ pub struct Finishing<'a> {
     /// Is told of it.
     pub progress: &'a dyn Progress,
     /// A result whose nodes above blocks are taken over where they are made of the same.
-    pub earlier: Option<&'a Earlier>,
+    pub earlier: Option<&'a PreviousBuild>,
     /// The options, as the result has them.
     pub parameters: serde_json::Value,
     /// Which share of a build it is.
@@ -70,7 +70,7 @@ impl Finishing<'_> {
         let Blocks { infos, reports: blocks, trees: of_blocks } = Blocks::of(blocks);
         let mut warnings = warnings(&inputs, &blocks, plan, earlier, self.globe);
         let Uppers { trees, reports: above, warnings: imperfect } =
-            match options.districts && subset.is_none() {
+            match options.upper_levels && subset.is_none() {
                 true => {
                     let none = SharedTextures::new();
                     let target = Target { options, out: output, shared: &none, stages, progress };
@@ -148,7 +148,7 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Of built blocks, by cell; their trees know the numbers of their blocks.
+    /// Numbers built blocks by cell and sets the numbers in their trees.
     pub fn of(blocks: BTreeMap<u32, Vec<BuiltBlock>>) -> Self {
         let mut all = Self { infos: Vec::new(), reports: Vec::new(), trees: BTreeMap::new() };
         for (cell, blocks) in blocks {
@@ -169,7 +169,7 @@ impl Blocks {
 }
 
 fn write_tilesets(scene: &Scene, output: &OutputDir) -> Result<Vec<FileReport>> {
-    // As whoever reads the scene will see it.
+    // The placement is read back from the parameters, as readers of the scene do.
     let placement = placement_of(&scene.parameters)?;
     let mut reports = Vec::new();
     for file in tileset::files(scene, &placement)? {
@@ -179,12 +179,12 @@ fn write_tilesets(scene: &Scene, output: &OutputDir) -> Result<Vec<FileReport>> 
     Ok(reports)
 }
 
-/// What was imperfect in inputs and blocks, and in where the result stands.
+/// Collects the warnings of inputs, blocks and placement.
 fn warnings(
     inputs: &[KnownInput],
     blocks: &[BlockReport],
     plan: &Plan,
-    earlier: Option<&Earlier>,
+    earlier: Option<&PreviousBuild>,
     globe: Option<&Globe>,
 ) -> Warnings {
     let mut warnings = Warnings::default();
@@ -210,9 +210,9 @@ fn warnings(
     let of_textures: BTreeSet<&String> =
         blocks.iter().flat_map(|block| &block.texture_warnings).collect();
     of_textures.into_iter().for_each(|text| warnings.add(text, 1));
-    // What a build that was stopped leaves has none either.
+    // The result of a build that was stopped has no tileset either.
     let has_none =
-        |earlier: &Earlier| earlier.report.tilesets.is_empty() && !earlier.is_unfinished();
+        |earlier: &PreviousBuild| earlier.report.tilesets.is_empty() && !earlier.is_unfinished();
     if earlier.is_some_and(has_none) {
         let file = crate::format::TILESET_FILE;
         let text =

@@ -8,9 +8,9 @@ use crate::mesh::{AlphaMode, Material, Model, Part};
 /// Which materials become which one.
 #[derive(Clone, Debug, Default)]
 pub struct Folding {
-    /// By material; `None` where it stays.
+    /// New number by material; `None` if it is kept.
     into: Vec<Option<u32>>,
-    /// Of each material that goes, its colour.
+    /// Colours of the materials that are replaced.
     colors: Vec<[f32; 4]>,
 }
 
@@ -49,7 +49,7 @@ impl Folding {
         Self { into, colors }
     }
 
-    /// What a material becomes; `None` where it stays.
+    /// Returns the replacement of a material; `None` if it is kept.
     pub fn of(&self, material: u32) -> Option<u32> {
         self.into.get(material as usize).copied().flatten()
     }

@@ -1,4 +1,4 @@
-//! What a result is built from: looking at inputs, and whether they have changed.
+//! Scans inputs, and finds which have changed since the previous build.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use crate::builder::partition::Scan;
 use crate::builder::plan::KnownInput;
 use crate::builder::prepare::{Prepared, Preparing};
 use crate::builder::progress::Progress;
-use crate::builder::reuse::Earlier;
+use crate::builder::reuse::PreviousBuild;
 use crate::builder::sources::{Sources, unchanged};
 use crate::builder::stages::{Stage, Stages};
 use crate::decode::texture_size;
@@ -25,8 +25,12 @@ fn describe(
     dependencies.par_iter().map(describe).collect()
 }
 
-/// What an earlier result knows of an input that has not changed.
-pub fn known(input: &Path, earlier: Option<&Earlier>, preparing: &Preparing) -> Option<KnownInput> {
+/// Returns the facts of an input from the previous build if it has not changed.
+pub fn known(
+    input: &Path,
+    earlier: Option<&PreviousBuild>,
+    preparing: &Preparing,
+) -> Option<KnownInput> {
     let known = earlier?.input(&text_of(input))?;
     let is_same = || unchanged(&known.report, preparing.sources);
     preparing.stages.time(Stage::Compare, is_same).then(|| known.clone())

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::builder::plan::KnownInput;
-use crate::builder::reuse::Earlier;
+use crate::builder::reuse::PreviousBuild;
 use crate::format::Subset;
 use crate::format::{REPORT_FILE, SUBSETS_DIR};
 use crate::report::build_report::BuildReport;
@@ -12,8 +12,8 @@ use crate::{Error, Result};
 
 /// The results of all subsets of one build, which fit together.
 pub struct Subsets {
-    results: Vec<Earlier>,
-    /// By block: which of the results has it.
+    results: Vec<PreviousBuild>,
+    /// Index of the result that has a block, by name.
     of_blocks: BTreeMap<String, usize>,
 }
 
@@ -33,7 +33,7 @@ impl Subsets {
         let mut of_blocks = BTreeMap::new();
         for (&subset, report) in subsets.iter().zip(&reports) {
             let dir = subset.dir(out);
-            let result = Earlier::open(&dir, &report.parameters).ok_or_else(|| {
+            let result = PreviousBuild::open(&dir, &report.parameters).ok_or_else(|| {
                 let what = "expected a whole result, found files missing, or of another size";
                 Error::input(&dir, format!("{what}; run hlod-build --subset {subset} again"))
             })?;
@@ -57,9 +57,9 @@ impl Subsets {
     }
 
     /// The result that has a block, and the block's numbers there.
-    pub fn blocks(&self, name: &str, made_of: &str) -> Option<(&Earlier, &[usize])> {
+    pub fn blocks(&self, name: &str, content_hash: &str) -> Option<(&PreviousBuild, &[usize])> {
         let result = &self.results[*self.of_blocks.get(name)?];
-        Some((result, result.blocks(name, made_of)?))
+        Some((result, result.blocks(name, content_hash)?))
     }
 }
 

@@ -38,8 +38,8 @@ pub struct BuildOptions {
     pub normals: bool,
     /// Weight of textured triangles in the cost (`c_textured`), 0–1.
     pub textured_weight: f64,
-    /// Whether there are nodes above the blocks ([`crate::builder::upper`]).
-    pub districts: bool,
+    /// Build upper levels: nodes above the blocks ([`crate::builder::upper`]).
+    pub upper_levels: bool,
     /// Keep to so many bytes of memory, [`LEAST_MEMORY`] or more: files that are large are built tile by tile
     /// ([`tiling`](crate::import::tiling)). Results are the same for any number, and not those without.
     pub max_memory: Option<u64>,
@@ -66,7 +66,7 @@ impl Default for BuildOptions {
             compress: false,
             normals: true,
             textured_weight: crate::format::attributes::TEXTURED_WEIGHT,
-            districts: true,
+            upper_levels: true,
             max_memory: None,
             resume: false,
             force: false,
@@ -127,7 +127,7 @@ impl BuildOptions {
             "max_atlas": self.max_atlas,
             "textured_weight": self.textured_weight,
             "normals": on_off(self.normals),
-            "districts": on_off(self.districts),
+            "upper_levels": on_off(self.upper_levels),
         });
         if let Some(quantization) = self.quantization() {
             quantization.note(&mut parameters);
@@ -175,7 +175,7 @@ impl BuildOptions {
             compress: parameters.get("compress").is_some(),
             normals: read_on_off(parameters, "normals")?,
             textured_weight: read(parameters, "textured_weight")?,
-            districts: read_on_off(parameters, "districts")?,
+            upper_levels: read_on_off(parameters, "upper_levels")?,
             // Tiles do not depend on how much it is.
             max_memory: parameters.get(TILES).map(|_| u64::MAX),
             resume: false,
@@ -252,7 +252,7 @@ mod tests {
             quantize: Some(0.01),
             compress: true,
             normals: false,
-            districts: false,
+            upper_levels: false,
             max_memory: Some(LEAST_MEMORY),
             ..BuildOptions::default()
         };

@@ -18,7 +18,7 @@ use crate::builder::partition::CellBox;
 use crate::builder::plan::{KnownInput, Plan};
 use crate::builder::prepare::{Prepared, Preparing};
 use crate::builder::progress::Progress;
-use crate::builder::reuse::Earlier;
+use crate::builder::reuse::PreviousBuild;
 use crate::builder::sources::Sources;
 use crate::builder::stages::{Stage, Stages};
 use crate::format::Subset;
@@ -81,15 +81,15 @@ pub fn merge_subsets(out: &Path, progress: &dyn Progress) -> Result<BuildReport>
     let plan = Plan::new(&inputs, agreed_up(&inputs), &options);
     let mut made = BuiltBlocks::default();
     for block in &plan.blocks {
-        let Some((earlier, numbers)) = subsets.blocks(&block.name, &block.made_of) else {
+        let Some((earlier, numbers)) = subsets.blocks(&block.name, &block.content_hash) else {
             continue;
         };
         let triangles = numbers.iter().map(|&number| earlier.report.blocks[number].triangles);
         progress.found(triangles.sum());
-        earlier.take_over_all(block, numbers, &output, progress, &mut made)?;
+        earlier.reuse_blocks(block, numbers, &output, progress, &mut made)?;
     }
     progress.finishing();
-    let earlier = Earlier::open(out, &parameters);
+    let earlier = PreviousBuild::open(out, &parameters);
     let finishing = Finishing {
         options: &options,
         globe: globe.as_ref(),
@@ -128,7 +128,7 @@ fn run(
     let unfinished = if options.resume { Unfinished::find(&target) } else { None };
 
     // What a subset has not built before may be in the result of a merge.
-    let open = |dir: &Path| Earlier::open(dir, &parameters);
+    let open = |dir: &Path| PreviousBuild::open(dir, &parameters);
     let known_result = || open(&target).or_else(|| open(out));
     let stopped = || unfinished.as_ref().and_then(|unfinished| open(unfinished.path()));
     let earlier = if options.force { None } else { stopped().or_else(known_result) };

@@ -1,4 +1,4 @@
-//! What is to be built: the partition of all inputs, and what each block is made of.
+//! Plans a build: the partition of all inputs, and the inputs and content hash of each block.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -15,48 +15,48 @@ use crate::{Error, Result};
 /// An input that was looked at.
 #[derive(Clone, Debug)]
 pub struct KnownInput {
-    /// For `build.json`.
+    /// Entry of `build.json`.
     pub report: InputReport,
-    /// Where its triangles are.
+    /// Histogram of its triangles.
     pub scan: Scan,
 }
 
 /// A block before anything is built.
 #[derive(Clone, Debug)]
 pub struct PlannedBlock {
-    /// Its cell.
+    /// Number of its cell.
     pub cell: u32,
-    /// What the names of its files begin with.
+    /// Prefix of the names of its files.
     pub name: String,
     /// The inputs that it may have triangles of, in order.
     pub inputs: Vec<usize>,
     /// A hash of all that it is made of.
-    pub made_of: String,
+    pub content_hash: String,
 }
 
 impl PlannedBlock {
     /// This, where nothing is left of it.
     pub fn empty(&self) -> EmptyBlock {
-        EmptyBlock { name: self.name.clone(), made_of: self.made_of.clone() }
+        EmptyBlock { name: self.name.clone(), content_hash: self.content_hash.clone() }
     }
 }
 
-/// What is to be built.
+/// The partition and the blocks of a build.
 pub struct Plan {
     /// Which axis points at the sky.
     pub up: UpAxis,
     /// The cells of all inputs.
     pub partition: Partition,
-    /// Of all blocks' vertices.
+    /// Lattice of all vertices.
     pub lattice: Lattice,
     /// Blocks are too large for the lattice that was asked for.
     pub is_coarser: bool,
-    /// In order of place.
+    /// Blocks in the order of cells.
     pub blocks: Vec<PlannedBlock>,
 }
 
 impl Plan {
-    /// For inputs of which everything is known.
+    /// Plans the build of scanned inputs.
     pub fn new(inputs: &[KnownInput], up: UpAxis, options: &BuildOptions) -> Self {
         let texels = options.hierarchy.constants.blocks.texels as f64;
         let most = Most { triangles: options.most_in_block(), texels };
@@ -100,7 +100,7 @@ struct Surroundings {
     blocks: BTreeSet<u32>,
     /// The inputs that the block may have triangles of.
     inputs: BTreeSet<usize>,
-    /// Those and others that may be near such a body: where it goes on in them it does not stay whole.
+    /// Those, and others near such a component: if it continues in them it is not kept whole.
     near: BTreeSet<usize>,
 }
 
@@ -185,9 +185,9 @@ fn planned(
             hasher.update(&file.bytes.to_le_bytes());
         }
     }
-    let made_of = hasher.finalize().to_hex().to_string();
+    let content_hash = hasher.finalize().to_hex().to_string();
     let inputs = own.into_iter().collect();
-    PlannedBlock { cell, name: format!("{stem}-{name}"), inputs, made_of }
+    PlannedBlock { cell, name: format!("{stem}-{name}"), inputs, content_hash }
 }
 
 /// The name of an input for people, as file names have it.
@@ -238,7 +238,7 @@ mod tests {
         for (x, is_in, is_near) in [(10.0, true, true), (20.0, false, true), (40.0, false, false)] {
             let (block, changed) = (west(x, "b"), west(x, "c"));
             assert_eq!(block.inputs.contains(&1), is_in, "{x}");
-            assert_eq!(block.made_of != changed.made_of, is_near, "{x}");
+            assert_eq!(block.content_hash != changed.content_hash, is_near, "{x}");
         }
     }
 }

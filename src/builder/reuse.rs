@@ -23,7 +23,7 @@ use crate::mesh::Warnings;
 use crate::report::build_report::{BlockReport, BuildReport, FileReport, UpperReport};
 
 /// A result whose nodes were made by this version with the same parameters, and are whole.
-pub struct Earlier {
+pub struct PreviousBuild {
     dir: PathBuf,
     /// Its scene.
     pub scene: Scene,
@@ -33,7 +33,7 @@ pub struct Earlier {
     pub tileset: bool,
     /// This is known of its inputs.
     inputs: Vec<KnownInput>,
-    /// Those, by path.
+    /// Index of inputs by path.
     input_of: FxHashMap<String, usize>,
     /// The roots of each block, in the scene's order.
     roots_of: Vec<Vec<u32>>,
@@ -52,7 +52,7 @@ fn is_as_written(dir: &Path, file: &FileReport) -> bool {
         .is_ok_and(|bytes| FileReport::of(&file.path, &bytes) == *file)
 }
 
-impl Earlier {
+impl PreviousBuild {
     /// `None` where there is none, or none that can be used.
     pub fn open(dir: &Path, parameters: &serde_json::Value) -> Option<Self> {
         let scene = Scene::read(dir).ok()?;
@@ -91,10 +91,10 @@ impl Earlier {
         }
         let mut block_of: FxHashMap<String, Vec<usize>> = FxHashMap::default();
         for (number, block) in report.blocks.iter().enumerate() {
-            block_of.entry(block.made_of.clone()).or_default().push(number);
+            block_of.entry(block.content_hash.clone()).or_default().push(number);
         }
         for block in &report.empty_blocks {
-            block_of.entry(block.made_of.clone()).or_default();
+            block_of.entry(block.content_hash.clone()).or_default();
         }
         let inputs = known_inputs(dir, &report.inputs)?;
         let paths = inputs.iter().map(|input| input.report.path.clone());
@@ -125,20 +125,20 @@ impl Earlier {
         self.input_of.get(path).map(|&at| &self.inputs[at])
     }
 
-    /// What it knows of all inputs, in order.
+    /// Returns the facts of all inputs, in order.
     pub fn inputs(&self) -> &[KnownInput] {
         &self.inputs
     }
 
     /// The blocks of a name that are made of this, and what lies far off beside it; none of one that is empty.
-    pub fn blocks(&self, name: &str, made_of: &str) -> Option<&[usize]> {
-        let numbers = self.block_of.get(made_of)?;
+    pub fn blocks(&self, name: &str, content_hash: &str) -> Option<&[usize]> {
+        let numbers = self.block_of.get(content_hash)?;
         let is_of = |&number: &usize| self.report.blocks[number].name.starts_with(name);
         numbers.iter().all(is_of).then_some(numbers)
     }
 
     /// Takes over [blocks](Self::blocks) that a planned one has become.
-    pub fn take_over_all(
+    pub fn reuse_blocks(
         &self,
         block: &PlannedBlock,
         numbers: &[usize],
@@ -150,14 +150,14 @@ impl Earlier {
             made.empty.push(block.empty());
         }
         for &number in numbers {
-            self.take_over(number, block.cell, output, made)?;
+            self.reuse_block(number, block.cell, output, made)?;
             progress.built(self.report.blocks[number].triangles);
         }
         Ok(())
     }
 
     /// Links the files of a block into the new output.
-    fn take_over(
+    fn reuse_block(
         &self,
         number: usize,
         cell: u32,
@@ -194,7 +194,7 @@ impl Earlier {
     }
 
     /// Links the file of a node above blocks into the new output, where it is made of what it was made of then.
-    pub fn take_over_upper(
+    pub fn reuse_upper(
         &self,
         upper: &UpperReport,
         output: &OutputDir,

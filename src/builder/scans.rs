@@ -1,5 +1,5 @@
-//! Where the triangles of inputs are, from one build to the next: `scans.hlod`. What has not changed need
-//! not be read to divide all inputs into blocks again.
+//! `scans.hlod`: the histograms of inputs. The next build partitions all inputs without reading those that
+//! have not changed.
 
 use std::path::Path;
 
@@ -8,13 +8,13 @@ use crate::builder::plan::KnownInput;
 use crate::format::SCANS_FILE;
 use crate::report::build_report::InputReport;
 
-/// What such a file begins with; the last byte is the version.
+/// First bytes of the file. The last one is the version.
 const MAGIC: &[u8; 8] = b"hlodscn\x02";
 
 /// Numbers of a cluster.
 const NUMBERS: usize = 15;
 
-/// As a file has it, little-endian; in the order of the inputs of its report.
+/// Serialises histograms, little-endian, in the order of the report's inputs.
 pub fn scans_to_bytes(inputs: &[KnownInput]) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend((inputs.len() as u32).to_le_bytes());

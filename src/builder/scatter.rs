@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use crate::builder::partition::{Bodies, CellBox, Others, Partition};
+use crate::builder::partition::{CellBox, KeptWhole, Others, Partition};
 use crate::mesh::{Model, Part};
 
 /// A block gets these triangles of an input.
@@ -16,7 +16,7 @@ pub struct BlockParts {
 }
 
 impl BlockParts {
-    /// Whether there is nothing.
+    /// Returns whether there is no triangle.
     pub fn is_empty(&self) -> bool {
         self.inner.is_empty() && self.crossing.is_empty()
     }
@@ -35,7 +35,7 @@ struct Chosen {
     crossing: Vec<u32>,
 }
 
-/// What each block gets of a model, by block; [`Bodies::new`] says what `most` and `others` are.
+/// Distributes the triangles of a model to blocks. [`KeptWhole::new`] explains `most` and `others`.
 pub fn scatter(
     model: Model,
     partition: &Partition,
@@ -48,7 +48,7 @@ pub fn scatter(
         blocks.extend((!all.is_empty()).then_some((0, all)));
         return blocks;
     }
-    let bodies = Bodies::new(&model, partition, most, others);
+    let bodies = KeptWhole::new(&model, partition, most, others);
     for (number, part) in model.parts.into_iter().enumerate() {
         let mut chosen: FxHashMap<u32, Chosen> = FxHashMap::default();
         for (triangle, corners) in part.indices.as_chunks::<3>().0.iter().enumerate() {

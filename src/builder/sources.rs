@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::builder::options::BuildOptions;
 use crate::builder::progress::Progress;
-use crate::builder::reuse::Earlier;
+use crate::builder::reuse::PreviousBuild;
 use crate::format::check_regular;
 use crate::import::tiling::{TILE_VERTICES, Tiling, is_divided};
 use crate::mesh::{Model, UpAxis};
@@ -36,7 +36,7 @@ impl Sources {
     pub fn divide(
         inputs: Vec<PathBuf>,
         options: &BuildOptions,
-        earlier: Option<&Earlier>,
+        earlier: Option<&PreviousBuild>,
         dir: &Path,
         progress: &dyn Progress,
     ) -> Result<(Self, Vec<PathBuf>)> {
@@ -70,7 +70,7 @@ impl Sources {
     }
 
     /// What an earlier result was built from, where that is all of `inputs` and none of them has changed.
-    fn unchanged(&self, inputs: &[PathBuf], earlier: &Earlier) -> Option<Vec<PathBuf>> {
+    fn unchanged(&self, inputs: &[PathBuf], earlier: &PreviousBuild) -> Option<Vec<PathBuf>> {
         let known = &earlier.report.inputs;
         let is_whole = earlier.report.subset.is_none() && earlier.tileset;
         let known_paths: BTreeSet<&Path> = known.iter().flat_map(paths).collect();

@@ -70,7 +70,7 @@ pub const TILESETS_DIR: &str = "tilesets";
 pub const SUBSETS_DIR: &str = "subsets";
 /// The folder of blocks' borders inside an output folder, which the next build needs and no viewer.
 pub const BORDERS_DIR: &str = "borders";
-/// Where triangles of inputs are, inside an output folder, which the next build needs and no viewer.
+/// File of the inputs' histograms inside an output folder, for the next build.
 pub const SCANS_FILE: &str = "scans.hlod";
 /// The scene description inside an output folder.
 pub const SCENE_FILE: &str = "scene.hlod";

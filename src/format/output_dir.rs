@@ -21,7 +21,7 @@ use crate::{Error, Result};
 
 /// The folder of shared textures in results of versions whose node files named `../textures/`.
 const EARLIER_TEXTURES_DIR: &str = "textures";
-/// Where nodes above blocks ended, in results of versions that had to know it.
+/// File of earlier versions with the borders of upper nodes.
 const EARLIER_RIMS_FILE: &str = "rims.hlod";
 /// Extensions of shared textures.
 const IMAGE_KINDS: &[&str] = &["jpg", "png"];

@@ -36,11 +36,11 @@ use super::clean::{CleanStats, clean};
 use super::mtl::{FIRST_TILE, Library, MtlMaterial};
 use super::names::{self, NameSample};
 use super::page_uses::PageUses;
-use super::paged::Paged;
+use super::paged::PagedVec;
 use super::paths::Finder;
 use super::plain_text::PlainText;
 use super::textures::{OpacityCache, Textures};
-use super::vertices::{NONE, Numbered, Unifier};
+use super::vertices::{NONE, Numbered, VertexDeduplicator};
 use super::words::Words;
 use crate::mesh::{Group, Model, Normal, Part, SAME_NORMAL, Warnings};
 use crate::stage_timer::StageTimer;
@@ -137,7 +137,7 @@ impl Batch {
     }
 }
 
-/// A part in the making: its indices are numbers of the [`Unifier`]'s vertices, and it has none yet.
+/// A part in the making: its indices are numbers of the [`VertexDeduplicator`]'s vertices, and it has none yet.
 #[derive(Default)]
 struct PartState {
     part: Part,
@@ -183,12 +183,12 @@ struct Obj<'a> {
     /// What `usemtl` named last; `None` before the first.
     material: Option<u32>,
 
-    positions: Paged<[f64; 3]>,
+    positions: PagedVec<[f64; 3]>,
     /// Empty until a vertex has a colour, then one per position: as in [`colors::Colors`].
-    colors: Paged<[u16; 4]>,
+    colors: PagedVec<[u16; 4]>,
     color_range: ColorRange,
-    texcoords: Paged<[f64; 2]>,
-    normals: Paged<Normal>,
+    texcoords: PagedVec<[f64; 2]>,
+    normals: PagedVec<Normal>,
 
     /// The names of the groups, as the file gives them.
     groups: Vec<Vec<u8>>,
@@ -201,7 +201,7 @@ struct Obj<'a> {
     /// The part of the current group and material once it has a face.
     part: Option<u32>,
 
-    unifier: Unifier,
+    unifier: VertexDeduplicator,
     /// Lines of the chunks so far.
     lines: u64,
 }
@@ -245,18 +245,18 @@ impl<'a> Obj<'a> {
             material_of_tile: BTreeMap::new(),
             faces_across_tiles: 0,
             material: None,
-            positions: Paged::default(),
-            colors: Paged::default(),
+            positions: PagedVec::default(),
+            colors: PagedVec::default(),
             color_range: ColorRange::default(),
-            texcoords: Paged::default(),
-            normals: Paged::default(),
+            texcoords: PagedVec::default(),
+            normals: PagedVec::default(),
             groups: Vec::new(),
             group_name: super::stem(path).into_bytes(),
             group: None,
             parts: Vec::new(),
             part_of: FxHashMap::default(),
             part: None,
-            unifier: Unifier::default(),
+            unifier: VertexDeduplicator::default(),
             lines: 0,
         }
     }

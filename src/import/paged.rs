@@ -13,7 +13,7 @@ const PAGE: usize = 1 << 15;
 
 /// A list in pages.
 #[derive(Debug)]
-pub(super) struct Paged<T> {
+pub(super) struct PagedVec<T> {
     pages: Vec<Page<T>>,
     len: usize,
 }
@@ -55,13 +55,13 @@ impl<T: Pod> Page<T> {
     }
 }
 
-impl<T> Default for Paged<T> {
+impl<T> Default for PagedVec<T> {
     fn default() -> Self {
         Self { pages: Vec::new(), len: 0 }
     }
 }
 
-impl<T: Pod> Paged<T> {
+impl<T: Pod> PagedVec<T> {
     /// How many elements were added.
     pub fn len(&self) -> usize {
         self.len
@@ -107,7 +107,7 @@ impl<T: Pod> Paged<T> {
     }
 }
 
-impl<T: Pod> Extend<T> for Paged<T> {
+impl<T: Pod> Extend<T> for PagedVec<T> {
     fn extend<I: IntoIterator<Item = T>>(&mut self, elements: I) {
         elements.into_iter().for_each(|element| self.push(element));
     }
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn elements_stay_where_they_are_until_their_page_goes() {
-        let mut list = Paged::default();
+        let mut list = PagedVec::default();
         list.extend(0..3 * PAGE + 5);
         assert_eq!(list.len(), 3 * PAGE + 5);
         assert!(list.iter().copied().eq(0..3 * PAGE + 5));

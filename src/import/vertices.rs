@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::paged::{Paged, page_of};
+use super::paged::{PagedVec, page_of};
 
 /// No index.
 pub(super) const NONE: u32 = u32::MAX;
@@ -16,10 +16,10 @@ const LONGEST_SEARCH: u32 = 64;
 /// The vertices, and those that use one position as a chain: OBJ indices are dense, so a list per
 /// position takes the place of a hash map.
 #[derive(Default)]
-pub(super) struct Unifier {
+pub(super) struct VertexDeduplicator {
     /// Per position: its newest vertex that is in its chain, or [`NONE`].
     heads: Vec<u32>,
-    vertices: Paged<Vertex>,
+    vertices: PagedVec<Vertex>,
     /// What was not found within [`LONGEST_SEARCH`] vertices of its chain.
     beyond: BTreeMap<Pair, u32>,
 }
@@ -44,7 +44,7 @@ struct Vertex {
     next: u32,
 }
 
-impl Unifier {
+impl VertexDeduplicator {
     /// Makes room for that many positions.
     pub(super) fn grow(&mut self, positions: usize) {
         self.heads.resize(positions.max(self.heads.len()), NONE);
@@ -103,7 +103,7 @@ impl Unifier {
 /// Vertices with their numbers within their parts.
 pub(super) struct Numbered {
     /// What was a chain is the number.
-    vertices: Paged<Vertex>,
+    vertices: PagedVec<Vertex>,
     /// How many each part has.
     pub(super) counts: Vec<u32>,
 }
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_pair_is_one_vertex_to_a_part() {
-        let mut unifier = Unifier::default();
+        let mut unifier = VertexDeduplicator::default();
         unifier.grow(3);
         let mut vertex =
             |part, position, texcoord| unifier.vertex(Pair { part, position, texcoord });
@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn very_long_chains_stay_right() {
-        let mut unifier = Unifier::default();
+        let mut unifier = VertexDeduplicator::default();
         unifier.grow(1);
         for _ in 0..2 {
             for texcoord in 0..1000 {

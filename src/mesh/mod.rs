@@ -24,7 +24,7 @@ pub use material::{AlphaMode, Material, TextureData, TextureSource, Wrap};
 pub use model::{Group, Model, Part, UpAxis, Warnings};
 pub use normal::Normal;
 pub(crate) use oriented_box::OrientedBox;
-pub use outline::{Kept, Outline, OutlineFrame};
+pub use outline::{Outline, OutlineCoverage, OutlineFrame};
 pub(crate) use polygon::Triangulator;
 pub use renumber::renumber;
 pub(crate) use surface::Surface;

@@ -50,7 +50,7 @@ pub struct Outline {
 /// What is kept of the ground that a source covers, seen from above, and of its skylines, seen from
 /// eight sides: shares of the source, 0–1. `None` where the source covers nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Kept {
+pub struct OutlineCoverage {
     /// Of the covered ground, what is covered still.
     pub area: Option<f64>,
     /// What is covered besides, over the area of the source; may exceed 1.
@@ -284,7 +284,7 @@ fn across(edges: &[Edge; 3], at: f64) -> Option<[f64; 2]> {
 impl Outline {
     /// What of the ground and of the skyline of `self` another outline of the same frame has, and
     /// what it adds.
-    pub fn kept_by(&self, other: &Self) -> Kept {
+    pub fn kept_by(&self, other: &Self) -> OutlineCoverage {
         let words = self.covered.iter().zip(&other.covered);
         let words = words.map(|(own, others)| [own, others].map(|w| w.load(Ordering::Relaxed)));
         let (mut area, mut both, mut more) = (0u64, 0u64, 0u64);
@@ -308,7 +308,7 @@ impl Outline {
             added += (others - own).max(0.0);
         }
         let share = |part: f64, of: f64| (of > 0.0).then(|| part / of);
-        Kept {
+        OutlineCoverage {
             area: share(both as f64, area as f64),
             area_added: share(more as f64, area as f64),
             skyline: share(height - lost, height),
@@ -317,7 +317,7 @@ impl Outline {
     }
 }
 
-impl Kept {
+impl OutlineCoverage {
     /// The smaller share of the ground and of the skyline; 1 where there is neither.
     pub fn least(&self) -> f64 {
         self.area.unwrap_or(1.0).min(self.skyline.unwrap_or(1.0))
@@ -354,7 +354,7 @@ mod tests {
         triangles
     }
 
-    fn kept_of(up: UpAxis, source: &[[DVec3; 3]], level: &[[DVec3; 3]]) -> Kept {
+    fn kept_of(up: UpAxis, source: &[[DVec3; 3]], level: &[[DVec3; 3]]) -> OutlineCoverage {
         let corners = source.iter().flatten().copied();
         let frame = OutlineFrame::around(up, corners, CELLS).unwrap();
         let [source, level] = [source, level].map(|triangles| {
@@ -365,7 +365,7 @@ mod tests {
         source.kept_by(&level)
     }
 
-    fn kept(source: &[[DVec3; 2]], level: &[[DVec3; 2]]) -> Kept {
+    fn kept(source: &[[DVec3; 2]], level: &[[DVec3; 2]]) -> OutlineCoverage {
         kept_of(UpAxis::Z, &boxes(source), &boxes(level))
     }
 
@@ -386,7 +386,7 @@ mod tests {
     #[test]
     fn what_is_the_same_is_kept_whole() {
         let all = houses(&mut Random::new(1, 0));
-        let whole = Kept {
+        let whole = OutlineCoverage {
             area: Some(1.0),
             area_added: Some(0.0),
             skyline: Some(1.0),

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::format::Subset;
 use crate::format::{NodeId, check_regular};
 use crate::import::is_model;
-use crate::mesh::{Kept, UpAxis, Warnings};
+use crate::mesh::{OutlineCoverage, UpAxis, Warnings};
 use crate::texture::BakeReason;
 use crate::{Error, Result, side_file};
 
@@ -21,12 +21,12 @@ pub struct BuildReport {
     pub version: String,
     /// What it was asked for; the same as [`Scene::parameters`](crate::format::Scene).
     pub parameters: serde_json::Value,
-    /// Where it is of a share of the blocks alone: of which, and what all inputs are.
+    /// The subset of blocks that was built, and the paths of all inputs; `None` for all blocks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub subset: Option<SubsetReport>,
     /// What it was built from, in order of path, so that the order of the arguments changes nothing.
     pub inputs: Vec<InputReport>,
-    /// Its blocks, in the order of the scene's.
+    /// Blocks, in the order of the scene.
     pub blocks: Vec<BlockReport>,
     /// Planned blocks of which nothing is left: all that is there stays whole on the other side of a cut.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -83,31 +83,31 @@ pub struct UpperReport {
     /// Its file.
     pub file: String,
     /// BLAKE3 of all that it is made of, in hexadecimal: the files below it and its borders.
-    pub made_of: String,
+    pub content_hash: String,
 }
 
 /// A planned block without a triangle.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct EmptyBlock {
-    /// What the names of its files would begin with.
+    /// Prefix that its files would have.
     pub name: String,
     /// BLAKE3 of all that it is made of, in hexadecimal.
-    pub made_of: String,
+    pub content_hash: String,
 }
 
 /// A block. Whoever takes over its nodes takes over all of this with them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BlockReport {
-    /// What the names of its files begin with.
+    /// Prefix of the names of its files.
     pub name: String,
     /// BLAKE3 of all that it is made of, in hexadecimal: its inputs' files, its place, and where others
     /// meet it.
-    pub made_of: String,
+    pub content_hash: String,
     /// Triangles of the source that it has or has parts of.
     pub triangles: u64,
     /// Different texels that its triangles use, repeating textures aside.
     pub texels: u64,
-    /// Its repeating textures, by a hash of each image: their texels.
+    /// Texels of its repeating textures, by a hash of the image.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub repeating: BTreeMap<String, u64>,
     /// Open edges of it that touch other borders without sharing vertices, and are joined with them
@@ -118,10 +118,10 @@ pub struct BlockReport {
     pub outcomes: Vec<Count>,
     /// Coarse nodes that are not written, by file.
     #[serde(default)]
-    pub left_out: Vec<LeftOutNode>,
-    /// What was imperfect in it and how often, in the order in which it was met.
+    pub left_out: Vec<SkippedNodeReport>,
+    /// Warnings and how often each occurred, in order of occurrence.
     pub warnings: Vec<Count>,
-    /// What was imperfect in its textures, which other blocks may have too.
+    /// Warnings of its textures, which other blocks may share.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub texture_warnings: Vec<String>,
 }
@@ -129,18 +129,18 @@ pub struct BlockReport {
 /// An input of the command line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InputReport {
-    /// As given, or as found in a given folder.
+    /// Path as given, or as found in a given folder.
     pub path: String,
     /// All files that were read for it or that it names: the model, its materials, its textures.
     pub files: Vec<FileReport>,
-    /// Its triangles after import.
+    /// Number of triangles after import.
     pub triangles: u64,
     /// Which of its axes points at the sky.
     pub up: UpAxis,
-    /// How that is known; `None` in results of versions that did not say.
+    /// How the axis was determined; `None` in results of earlier versions.
     #[serde(default)]
     pub up_from: Option<UpFrom>,
-    /// What was imperfect in it and how often, in the order in which it was met.
+    /// Warnings and how often each occurred, in order of occurrence.
     pub warnings: Vec<Count>,
 }
 
@@ -317,13 +317,13 @@ pub struct OverBudget {
 /// its source covers, or of its skyline, even with almost as many triangles as those below it. These
 /// stand in its place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LeftOutNode {
+pub struct SkippedNodeReport {
     /// The name that its file would have.
     pub file: String,
     /// The triangles that it would have.
     pub triangles: u64,
     /// What it would keep with these.
-    pub kept: Kept,
+    pub kept: OutlineCoverage,
 }
 
 /// A node that was simplified across texture seams and has a texture of its own.

@@ -21,9 +21,9 @@ const CROP_FILL: f64 = 0.9;
 const ISLAND_FILL: f64 = 0.95;
 
 /// What one atlas is made of.
-pub(crate) struct Sheet<'a> {
+pub(crate) struct AtlasInput<'a> {
     /// All have the same number of channels.
-    pub images: Vec<SheetImage<'a>>,
+    pub images: Vec<AtlasImage<'a>>,
     /// Texels per cell: a power of two. Mip levels down to one texel a cell mix no patches.
     pub cell: usize,
     /// Longest side of a page.
@@ -31,7 +31,7 @@ pub(crate) struct Sheet<'a> {
 }
 
 /// A level image and the triangles over it.
-pub(crate) struct SheetImage<'a> {
+pub(crate) struct AtlasImage<'a> {
     pub image: &'a LevelImage,
     /// The corners of the triangles, in the image's texels and inside it.
     pub corners: Vec<[[f64; 2]; 3]>,
@@ -91,7 +91,7 @@ struct Patch {
     shape: Shape,
 }
 
-impl Sheet<'_> {
+impl AtlasInput<'_> {
     /// Packs and copies. `None` where something does not fit a page, or all does not fit
     /// `max_pages`: the caller must take coarser images.
     pub fn build(&self, max_pages: usize) -> Option<Atlas> {
@@ -122,7 +122,7 @@ impl Sheet<'_> {
     }
 
     /// The window that holds all triangles' texels, if it fits a page.
-    fn window(&self, lone: &SheetImage) -> Option<Window> {
+    fn window(&self, lone: &AtlasImage) -> Option<Window> {
         let bounds = bounds(&lone.corners);
         let mut window = Window { origin: [0; 2], size: [0; 2] };
         for axis in 0..2 {
@@ -190,7 +190,7 @@ impl Sheet<'_> {
     }
 
     /// The cells that triangles of an image use, and the texel where their grid begins.
-    fn cells(&self, image: &SheetImage, triangles: &[u32]) -> ([isize; 2], BitGrid) {
+    fn cells(&self, image: &AtlasImage, triangles: &[u32]) -> ([isize; 2], BitGrid) {
         let scale = 1.0 / self.cell as f64;
         let mut bounds = UvBox::EMPTY;
         for triangle in triangles {
@@ -223,7 +223,7 @@ impl Sheet<'_> {
     }
 
     /// The triangles of each island. A chart lies in one island, so its first triangle tells.
-    fn members(&self, image: &SheetImage, origin: [isize; 2], islands: &Islands) -> Vec<Vec<u32>> {
+    fn members(&self, image: &AtlasImage, origin: [isize; 2], islands: &Islands) -> Vec<Vec<u32>> {
         let mut members = vec![Vec::new(); islands.shapes.len()];
         let charts = image.charts.iter().max().map_or(0, |chart| *chart as usize + 1);
         let mut island_of = vec![None; charts];
@@ -310,7 +310,7 @@ impl Sheet<'_> {
     }
 }
 
-impl SheetImage<'_> {
+impl AtlasImage<'_> {
     /// By chart: its box, where its triangles fill it.
     fn filled_charts(&self) -> Vec<Option<UvBox>> {
         let count = self.charts.iter().max().map_or(0, |chart| *chart as usize + 1);

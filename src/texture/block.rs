@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::bake::classes::BakeClasses;
 use super::bake::plan::{BakePlan, BakeReason, bake_decision};
-use super::bake::source::Source;
+use super::bake::source::BakeSource;
 use super::bits::BitGrid;
 use super::cache::{Decoded, TextureCache};
 use super::charts::{self, Charts, UvBox};
@@ -69,7 +69,7 @@ pub struct BlockTextures<'a> {
     /// The materials that may be baked.
     pub(super) classes: BakeClasses,
     /// What nodes are baked from; `None` where none is.
-    pub(super) source: Option<Source>,
+    pub(super) source: Option<BakeSource>,
     /// Why all coarse nodes are baked, where they are.
     bake_always: Option<BakeReason>,
     used_texels: u64,
@@ -212,7 +212,7 @@ impl<'a> BlockTextures<'a> {
         charts.dedup();
         let decision = bake_decision(charts.len(), self.options.root_triangles);
         let Some(always) = decision else { return };
-        let source = Source::new(mesh, &classes, |triangle| {
+        let source = BakeSource::new(mesh, &classes, |triangle| {
             let (texture, source) = atlas(mesh.triangle_material(triangle))?;
             let chart = usage.charts.of_vertex[triangle[0] as usize];
             let bounds = &usage.charts.boxes[chart as usize];

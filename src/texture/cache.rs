@@ -36,7 +36,7 @@ impl Decoded {
     }
 }
 
-/// What an image is decoded from, and how.
+/// Identifies a decoded image: its source and opacity.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct ImageKey {
     data: ImageData,
@@ -47,7 +47,7 @@ struct ImageKey {
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum ImageData {
     File(PathBuf),
-    /// Where the bytes are in memory: a slot keeps them there.
+    /// Address of the bytes in memory. A slot keeps them alive.
     Embedded(usize),
 }
 
@@ -72,7 +72,7 @@ pub struct DecodedImages {
 #[derive(Debug)]
 pub struct Announced<'a> {
     images: &'a DecodedImages,
-    /// By texture; `None` of those that it does not take.
+    /// Slot by texture; `None` for textures that are not used.
     slots: Vec<Option<(ImageKey, Arc<Slot>)>>,
     is_taken: Vec<AtomicBool>,
 }
@@ -133,7 +133,7 @@ pub struct TextureCache<'a> {
     model: &'a Model,
     plan: &'a TexturePlan,
     announced: &'a Announced<'a>,
-    /// Of each texture that was taken.
+    /// Findings by texture that was decoded.
     found: Mutex<BTreeMap<u32, (Option<String>, Findings)>>,
 }
 
@@ -168,7 +168,7 @@ fn is_obj(source: &Path) -> bool {
 }
 
 impl<'a> TextureCache<'a> {
-    /// Those that were announced, of a model. Decodes nothing yet.
+    /// Creates the cache of a model's announced textures. Decodes nothing yet.
     pub fn new(model: &'a Model, plan: &'a TexturePlan, announced: &'a Announced<'a>) -> Self {
         Self { model, plan, announced, found: Mutex::default() }
     }

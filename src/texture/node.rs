@@ -5,7 +5,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use super::atlas::{Atlas, Page, PatchPlacement, Sheet, SheetImage};
+use super::atlas::{Atlas, AtlasImage, AtlasInput, Page, PatchPlacement};
 use super::bake::BakedMesh;
 use super::block::{BlockTextures, Prepared};
 use super::charts::{self, Charts, NO_CHART, UvBox};
@@ -303,7 +303,7 @@ impl<'a> NodeBuilder<'a> {
         loop {
             let (sheet_images, members) = self.baked_images(first, &images, mapping);
             let cell = self.block.baked_cell(self.level);
-            let sheet = Sheet { images: sheet_images, cell, max_side: self.max_side() };
+            let sheet = AtlasInput { images: sheet_images, cell, max_side: self.max_side() };
             let is_least = images.iter().all(|image| image.size == [1, 1]);
             if let Some(atlas) = sheet.build(if is_least { usize::MAX } else { 1 }) {
                 let mut mappings = vec![None; first as usize];
@@ -325,13 +325,13 @@ impl<'a> NodeBuilder<'a> {
         first: u32,
         images: &'p [Cow<LevelImage>],
         mapping: Mapping,
-    ) -> (Vec<SheetImage<'p>>, Vec<Vec<u32>>) {
-        let empty = |image: &'p Cow<LevelImage>| SheetImage {
+    ) -> (Vec<AtlasImage<'p>>, Vec<Vec<u32>>) {
+        let empty = |image: &'p Cow<LevelImage>| AtlasImage {
             image,
             corners: Vec::new(),
             charts: Vec::new(),
         };
-        let mut lists: Vec<SheetImage> = images.iter().map(empty).collect();
+        let mut lists: Vec<AtlasImage> = images.iter().map(empty).collect();
         let mut members = vec![Vec::new(); images.len()];
         for (index, triangle) in self.mesh.triangles.iter().enumerate() {
             let chart =
@@ -375,7 +375,8 @@ impl<'a> NodeBuilder<'a> {
             };
             let mappings = self.texel_mappings(&images, &levels);
             let (sheet_images, members) = self.sheet_images(&images, &levels, &mappings);
-            let sheet = Sheet { images: sheet_images, cell: self.block.cell(self.level), max_side };
+            let sheet =
+                AtlasInput { images: sheet_images, cell: self.block.cell(self.level), max_side };
             // Many pictures may need several however small they are.
             let is_least = levels.iter().all(|image| image.size == [1, 1]);
             let max_pages = if is_leaf && halvings == 0 || is_least { usize::MAX } else { 1 };
@@ -464,11 +465,11 @@ impl<'a> NodeBuilder<'a> {
         images: &BTreeMap<u32, usize>,
         levels: &[&'p LevelImage],
         mappings: &[Option<Mapping>],
-    ) -> (Vec<SheetImage<'p>>, Vec<Vec<u32>>) {
+    ) -> (Vec<AtlasImage<'p>>, Vec<Vec<u32>>) {
         let mut members = vec![Vec::new(); levels.len()];
         let empty =
-            |image: &&'p LevelImage| SheetImage { image, corners: Vec::new(), charts: Vec::new() };
-        let mut lists: Vec<SheetImage> = levels.iter().map(empty).collect();
+            |image: &&'p LevelImage| AtlasImage { image, corners: Vec::new(), charts: Vec::new() };
+        let mut lists: Vec<AtlasImage> = levels.iter().map(empty).collect();
         for (index, triangle) in self.mesh.triangles.iter().enumerate() {
             let Some(chart) = self.chart_of(*triangle) else { continue };
             let Some(mapping) = &mappings[chart] else { continue };

@@ -26,17 +26,17 @@ pub struct TexturePlan {
     alpha: Vec<bool>,
 }
 
-/// How the triangles of models use their textures; sums up over models.
+/// Statistics of how triangles use textures. They can be summed over models.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TextureUsage {
-    /// Of each texture, the area of its triangles in texture space, in tiles.
+    /// Area of each texture's triangles in texture space, in tiles.
     areas: Vec<f64>,
-    /// Of each texture, what single triangles say of it.
+    /// Use of each texture by single triangles.
     uses: Vec<TextureUse>,
 }
 
 impl TextureUsage {
-    /// Of a model's triangles, without looking at any image.
+    /// Computes the statistics of a model without decoding images.
     pub fn of(model: &Model) -> Self {
         let mut areas = vec![0.0; model.textures.len()];
         let mut uses = vec![TextureUse::Unused; model.textures.len()];

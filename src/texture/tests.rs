@@ -3,7 +3,7 @@
 use std::io::Cursor;
 use std::path::PathBuf;
 
-use super::atlas::{Atlas, Page, Sheet, SheetImage};
+use super::atlas::{Atlas, AtlasImage, AtlasInput, Page};
 use super::level::{LevelImage, Region, level_images};
 use super::*;
 use crate::decode::DecodedTexture;
@@ -124,10 +124,10 @@ fn sampling_the_atlas_equals_sampling_the_source() {
     let level = whole(numbered(256, 256));
     for (round, cell) in [2, 4, 8, 2, 4, 8, 2, 2].into_iter().enumerate() {
         let (corners, charts) = scattered(&mut random, 256.0);
-        let image = SheetImage { image: &level, corners: corners.clone(), charts };
+        let image = AtlasImage { image: &level, corners: corners.clone(), charts };
         // Every other round is forced onto several pages.
         let max_side = if round % 2 == 0 { 4096 } else { 160 };
-        let sheet = Sheet { images: vec![image], cell, max_side };
+        let sheet = AtlasInput { images: vec![image], cell, max_side };
         let Some(atlas) = sheet.build(usize::MAX) else { continue };
         for (triangle, corners) in corners.iter().enumerate() {
             for _ in 0..40 {
@@ -158,8 +158,9 @@ fn mips_that_the_cell_promises_show_no_neighbour() {
         let (right, more) = scattered(&mut random, 100.0);
         corners.extend(right.iter().map(|t| t.map(|at| [at[0] + 156.0, at[1]])));
         charts.extend(more.iter().map(|chart| chart + 100));
-        let image = SheetImage { image: &level, corners: corners.clone(), charts };
-        let atlas = Sheet { images: vec![image], cell, max_side: 4096 }.build(1).expect("fits");
+        let image = AtlasImage { image: &level, corners: corners.clone(), charts };
+        let atlas =
+            AtlasInput { images: vec![image], cell, max_side: 4096 }.build(1).expect("fits");
         let mut page = atlas.pages[0].clone();
         for mip in 0..=mips {
             let scale = 1.0 / f64::from(1 << mip);

@@ -77,7 +77,7 @@ use source::Source;
 
 use crate::format::{SCENE_FILE, Scene};
 use crate::lattice::Quantization;
-use crate::mesh::Kept;
+use crate::mesh::OutlineCoverage;
 use crate::place::placement_of;
 use crate::{Error, Result};
 
@@ -274,7 +274,9 @@ impl Verification<'_> {
         let outlines = Outlines::of(scene.up, leaves, geometry);
         let kept = |front: &Front| {
             let nodes: Vec<u32> = front.nodes().collect();
-            outlines.as_ref().map_or_else(Kept::default, |outlines| outlines.kept_by(&nodes))
+            outlines
+                .as_ref()
+                .map_or_else(OutlineCoverage::default, |outlines| outlines.kept_by(&nodes))
         };
         let measure = |front: &Front, level: Option<u32>| {
             let seed = options.seed;

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::geometry::NodeGeometry;
-use crate::mesh::{Kept, Outline, OutlineFrame, UpAxis};
+use crate::mesh::{Outline, OutlineCoverage, OutlineFrame, UpAxis};
 
 /// Along the longer side of the scene.
 const CELLS: usize = 4096;
@@ -29,7 +29,7 @@ impl<'a> Outlines<'a> {
     }
 
     /// What nodes keep of it.
-    pub fn kept_by(&self, nodes: &[u32]) -> Kept {
+    pub fn kept_by(&self, nodes: &[u32]) -> OutlineCoverage {
         self.leaves.kept_by(&outline(&self.frame, nodes, self.geometry))
     }
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::options::VerifyOptions;
 use crate::cells::SeenFaces;
 use crate::format::NodeId;
-use crate::mesh::Kept;
+use crate::mesh::OutlineCoverage;
 use crate::{Error, Result};
 
 /// Failures of one check that are listed; the others are counted.
@@ -195,7 +195,7 @@ pub struct LevelFigures {
     /// The larger of both.
     pub two_sided: Distance,
     /// What it keeps of the outline of the leaves, by 4,096 cells.
-    pub kept: Kept,
+    pub kept: OutlineCoverage,
     /// RMS colour difference, sRGB 0–255, between points of the source and what stands for them: the
     /// nearest surface within 60 degrees of facing the same way. `None` where nothing could be
     /// compared.

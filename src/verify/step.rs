@@ -31,7 +31,7 @@ pub(super) fn fine_steps(scene: &Scene) -> Vec<f64> {
     fine_lattices(scene).into_iter().map(|fine| fine.step).collect()
 }
 
-/// What nodes have one lattice.
+/// Nodes with a common lattice.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Group {
     Blocks,
@@ -40,7 +40,7 @@ enum Group {
     Above,
 }
 
-/// Of each node.
+/// Returns the lattice of each node.
 fn fine_lattices(scene: &Scene) -> Vec<Lattice> {
     let is_far_off = |block: u32| {
         scene.blocks.get(block as usize).is_some_and(|block| block.name.ends_with("(far off)"))
@@ -50,8 +50,7 @@ fn fine_lattices(scene: &Scene) -> Vec<Lattice> {
         Some(_) => Group::Blocks,
         None => Group::Above,
     };
-    // Of what has one origin: a block, or a node above blocks. Coarse nodes may reach beyond the source;
-    // leaves do not.
+    // Boxes of the leaves by origin: a block, or an upper node. Coarse nodes may extend beyond the source.
     let mut boxes: BTreeMap<(Group, u32), [[f64; 3]; 2]> = BTreeMap::new();
     let mut add = |of: (Group, u32), node: &Node| {
         let [low, high] = boxes.entry(of).or_insert([node.bbox_min, node.bbox_max]);

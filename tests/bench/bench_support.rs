@@ -23,7 +23,7 @@ pub fn hlod_bench() -> Command {
 /// Two blocks with pictures of their own; read only.
 pub fn city() -> &'static Path {
     static DIR: LazyLock<PathBuf> = LazyLock::new(|| {
-        let mut options = BuildOptions { districts: false, ..build_options(66) };
+        let mut options = BuildOptions { upper_levels: false, ..build_options(66) };
         options.hierarchy.constants.blocks.divided = 55;
         built("city", &options, |folder| write_city(folder, &small_city()))
     });

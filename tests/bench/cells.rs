@@ -224,7 +224,7 @@ fn no_background_shows_through_a_closed_city_but_for_slits_of_a_pixel() {
     let folder = tempfile::tempdir().unwrap();
     let built = folder.path().join("out");
     let blocks = BlockSplit::Grid(54.0);
-    let build = BuildOptions { blocks, districts: false, ..build_options(250) };
+    let build = BuildOptions { blocks, upper_levels: false, ..build_options(250) };
     build_with(&[write_city(folder.path(), &options)], &built, &build);
     let place = Place::new(&built);
     let ground = Ground::read(&place.scene(), &place.out()).unwrap();

@@ -159,7 +159,7 @@ fn closed_cities_show_no_background_through_any_mixture_of_levels() {
     let folder = tempfile::tempdir().unwrap();
     // Blocks of four levels.
     let blocks = BlockSplit::Grid(60.0);
-    let options = BuildOptions { blocks, districts: false, ..build_options(250) };
+    let options = BuildOptions { blocks, upper_levels: false, ..build_options(250) };
     let session = closed_city(folder.path(), &options);
     no_background_shows_through(&session, folder.path(), 0.0, |_, _| true);
 }
@@ -169,7 +169,7 @@ fn closed_cities_show_no_background_through_any_mixture_of_levels() {
 fn nodes_above_blocks_show_no_background_beside_each_other_or_beside_any_level_below_them() {
     let folder = tempfile::tempdir().unwrap();
     let blocks = BlockSplit::Grid(10.0);
-    let options = BuildOptions { blocks, districts: true, ..build_options(250) };
+    let options = BuildOptions { blocks, upper_levels: true, ..build_options(250) };
     let session = closed_city(folder.path(), &options);
     assert!(session.scene().blocks.len() > 40, "{} blocks", session.scene().blocks.len());
     let tops = session.tree().roots().len();

@@ -173,7 +173,7 @@ fn blocks_of_many_houses_are_true_to_them() {
         let folder = tempfile::tempdir().unwrap();
         write_town(folder.path());
         let options = ["--quiet", "--desired-tris", "300", "--blocks", "grid:200"];
-        let options = [&options[..], &["--districts", "off"]].concat();
+        let options = [&options[..], &["--upper-levels", "off"]].concat();
         run_build(folder.path(), &[&options[..], &["town.obj", "out"]].concat());
         let out = folder.path().join("out");
         let built = Built::read(&out);

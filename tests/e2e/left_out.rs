@@ -59,7 +59,7 @@ fn options(least_kept: f64) -> BuildOptions {
     let constants = Constants { outline, ..Constants::default() };
     let hierarchy =
         HierarchyOptions { desired_tris: 300, constants, ..HierarchyOptions::default() };
-    BuildOptions { hierarchy, districts: false, ..BuildOptions::default() }
+    BuildOptions { hierarchy, upper_levels: false, ..BuildOptions::default() }
 }
 
 fn verified(out: &Path) -> VerifyReport {

@@ -48,7 +48,7 @@ fn roots(scene: &Scene) -> usize {
 #[test]
 fn few_trees_stand_above_the_blocks_which_are_as_without_them() {
     let folder = parts();
-    build_parts(&folder, "off", &BuildOptions { districts: false, ..small() });
+    build_parts(&folder, "off", &BuildOptions { upper_levels: false, ..small() });
     build_parts(&folder, "on", &small());
     let (off, on) = (scene(&folder.path().join("off")), scene(&folder.path().join("on")));
     assert!(roots(&off) > 24, "{} roots", roots(&off));
@@ -133,7 +133,7 @@ fn streets_in_squares_have_nodes_above_them_at_any_number_of_threads() {
             hierarchy,
             blocks,
             quantize,
-            districts: true,
+            upper_levels: true,
             ..BuildOptions::default()
         };
         let mut first = None;

@@ -83,7 +83,7 @@ fn vertices_on_planes_are_as_good_as_others() {
     check(&mut table, "", &options(), true);
     // How many nodes stand above squares follows from how many triangles these have.
     let blocks = BlockSplit::Grid(16.0);
-    let grid = BuildOptions { blocks, districts: false, ..options() };
+    let grid = BuildOptions { blocks, upper_levels: false, ..options() };
     check(&mut table, ", blocks of 16 m", &grid, false);
     table.finish();
 }

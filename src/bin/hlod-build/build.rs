@@ -32,7 +32,7 @@ pub struct BuildArgs {
     /// Nodes above the blocks, so that a view of a whole city costs the same however many blocks it
     /// has: `on`, or `off`, with which such a view draws at least the roots of all blocks
     #[arg(long, value_enum, default_value_t = SwitchArg::On, help_heading = "Hierarchy")]
-    districts: SwitchArg,
+    upper_levels: SwitchArg,
     /// The shape of the trees
     #[arg(long, value_enum, default_value_t = TreeArg::Balanced, help_heading = "Hierarchy")]
     tree: TreeArg,
@@ -193,7 +193,7 @@ impl BuildArgs {
                 ..Default::default()
             },
             blocks: self.blocks,
-            districts: self.districts == SwitchArg::On,
+            upper_levels: self.upper_levels == SwitchArg::On,
             up: self.up.map(|up| match up {
                 UpArg::Y => UpAxis::Y,
                 UpArg::Z => UpAxis::Z,

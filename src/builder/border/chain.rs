@@ -103,7 +103,7 @@ impl<C: Coordinate> CutPlane<C> {
         rule: &KeepRule,
     ) -> Self {
         let runs = chains_of(vertices, edges);
-        // For each run, this lists the places of the vertices that some node has.
+        // Per run, the indices of the vertices that some node has.
         let there: Vec<Vec<u32>> = runs
             .iter()
             .map(|run| {

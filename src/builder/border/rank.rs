@@ -25,7 +25,7 @@ pub struct SurfaceQuadric {
 }
 
 impl SurfaceQuadric {
-    /// Its coefficients: xx, yy, zz, xy, xz, yz.
+    /// Returns the coefficients in the order xx, yy, zz, xy, xz, yz.
     pub fn terms(&self) -> [f64; 6] {
         self.terms
     }

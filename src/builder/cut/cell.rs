@@ -19,7 +19,7 @@ pub struct CellCut {
 pub struct CellSide {
     /// The plane that it lies in.
     pub plane: AxisPlane,
-    /// Whether the cell is below it.
+    /// True for the plane at the upper end of the cell along its axis.
     pub is_upper: bool,
     /// The parts of it that other cells have too, flat boxes, in an order of places.
     pub patches: Vec<CellBox>,
@@ -42,7 +42,7 @@ pub struct Piece {
 }
 
 impl CellCut {
-    /// Of a block of a partition.
+    /// Creates the cutter of one block of a partition.
     pub fn new(partition: &Partition, block: u32) -> Self {
         let place = partition.cell(block).place;
         let mut sides = Vec::new();
@@ -78,7 +78,7 @@ impl CellCut {
         &self.sides
     }
 
-    /// Whether a box is within and touches no side.
+    /// Returns whether a box lies strictly inside the cell.
     pub fn holds_within(&self, place: &CellBox) -> bool {
         self.place.holds_within(place)
     }
@@ -113,7 +113,7 @@ impl CellCut {
         let mut piece = Piece::default();
         piece.places.extend(polygon.iter().map(|corner| corner.place));
         let count = polygon.len();
-        // Of each edge of the polygon, the places that divide it, in order.
+        // Per edge of the polygon, the points that divide it, in order.
         let between: Vec<Vec<Place>> = (0..count)
             .map(|at| {
                 let (from, to) = (&polygon[at], &polygon[(at + 1) % count]);
@@ -210,7 +210,7 @@ fn divide(corners: [u32; 3], divided: &[([u32; 2], Vec<u32>)], triangles: &mut V
     for turn in 0..3 {
         let [a, b, c] = [0, 1, 2].map(|at| corners[(at + turn) % 3]);
         let Some((_, places)) = divided.iter().find(|(edge, _)| *edge == [a, b]) else { continue };
-        // What is left of the others is of the first and of the last of them.
+        // The remaining part of the others belongs to the first and the last of them.
         let mut from = a;
         for &place in places.iter().chain([&b]) {
             divide([from, place, c], divided, triangles);

@@ -116,7 +116,7 @@ fn pieces_of_all_blocks_are_the_whole_and_meet_without_a_gap() {
             // Rounded, a surface is a little larger or smaller.
             let most = 1e-9 + 0.5 * lattice.step;
             assert!((after / before - 1.0).abs() < most, "{seed} {step}: {before} {after}");
-            // What is open is on the border of the whole, which cuts divide.
+            // Open edges lie on the border of the whole mesh, which cuts divide.
             let of_whole = open_edges(whole.into_iter());
             let on_border: Vec<PositionKey<f64>> = of_whole.iter().flatten().copied().collect();
             let open = open_edges(all());

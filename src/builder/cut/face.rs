@@ -23,16 +23,16 @@ use crate::mesh::{Normal, Part, PositionKey, color_key, key, texcoord_key};
 pub struct SideTriangle {
     /// This holds its corners.
     pub triangle: Triangle,
-    /// Of each corner.
-    looks: [Look; 3],
+    /// Appearance of each corner.
+    looks: [Appearance; 3],
     material: u32,
     /// The same wherever the triangle is met.
     order: ([PositionKey<f64>; 3], u64),
 }
 
-/// What a corner looks like.
+/// Attributes of a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Look {
+struct Appearance {
     texcoord: [f32; 2],
     color: [u16; 4],
     normal: Normal,
@@ -41,7 +41,7 @@ struct Look {
 impl SideTriangle {
     /// A triangle of a part.
     pub fn new(part: &Part, corners: [u32; 3], lattice: Lattice) -> Self {
-        let look = |vertex: u32| Look {
+        let look = |vertex: u32| Appearance {
             texcoord: part.texcoords.get(vertex as usize).copied().unwrap_or_default(),
             color: part.colors.get(vertex as usize).copied().unwrap_or([u16::MAX; 4]),
             normal: part.normals.get(vertex as usize).copied().unwrap_or(Normal::NONE),
@@ -50,7 +50,7 @@ impl SideTriangle {
         let positions = corners.map(|vertex| part.positions[vertex as usize]);
         let mut hasher = FxHasher::default();
         part.material.hash(&mut hasher);
-        for Look { texcoord, color, normal } in looks {
+        for Appearance { texcoord, color, normal } in looks {
             (texcoord_key(texcoord), color_key(color), normal).hash(&mut hasher);
         }
         Self {
@@ -66,7 +66,7 @@ impl SideTriangle {
         let mut hasher = FxHasher::default();
         self.material.hash(&mut hasher);
         // The corners with a share in an order of their own, so that an edge is one from both sides.
-        let mut shares: Vec<(PositionKey<f64>, u64, Look)> = (0..3)
+        let mut shares: Vec<(PositionKey<f64>, u64, Appearance)> = (0..3)
             .filter(|&corner| place.weights[corner] > 0.0)
             .map(|corner| {
                 let weight = place.weights[corner].to_bits();
@@ -74,7 +74,7 @@ impl SideTriangle {
             })
             .collect();
         shares.sort_by_key(|&(position, weight, _)| (position, weight));
-        for (_, weight, Look { texcoord, color, normal }) in shares {
+        for (_, weight, Appearance { texcoord, color, normal }) in shares {
             (weight, texcoord_key(texcoord), color_key(color), normal).hash(&mut hasher);
         }
         hasher.finish()
@@ -99,11 +99,11 @@ pub struct FaceBorder {
     pub vertices: Vec<FaceVertex>,
     /// Pairs of vertices.
     pub edges: Vec<[u32; 2]>,
-    /// Where both sides touch without an edge.
+    /// Points in which both sides touch without a common edge.
     pub touching: Vec<[f64; 3]>,
 }
 
-/// What is known of a vertex.
+/// A vertex of a border in a cutting plane.
 struct Vertex {
     position: [f64; 3],
     surface: SurfaceQuadric,
@@ -212,7 +212,7 @@ impl FaceBorder {
     }
 }
 
-/// Where a triangle meets a plane.
+/// The intersection of a triangle with a plane.
 struct Sections {
     lines: Vec<(Line, [Place; 2])>,
     points: Vec<Place>,

@@ -11,9 +11,9 @@ use crate::mesh::{PositionKey, key};
 
 /// The borders of a chunk with others.
 pub struct Marks<'a> {
-    /// Its planes.
+    /// Cutting planes that bound the chunk.
     pub planes: Vec<&'a CutPlane<f64>>,
-    /// What others touch without an edge: it stays at every level.
+    /// Positions in which other chunks touch this one without a common edge. They are kept at every level.
     pub touching: FxHashSet<PositionKey<f64>>,
     /// Levels that planes are ranked for and that are coarser than any of the chunk.
     pub coarser: usize,

@@ -12,7 +12,7 @@ use crate::{Error, Result};
 pub struct RecordedFace {
     /// The axis that the plane is across.
     pub axis: usize,
-    /// Where it meets that axis, source coordinate.
+    /// Coordinate on that axis, in source coordinates.
     pub at: f64,
     /// Vertices; one that several cells beyond have is there for each.
     pub vertices: Vec<FaceVertex>,
@@ -27,11 +27,11 @@ pub struct RecordedBorder {
     pub faces: Vec<RecordedFace>,
 }
 
-/// What such a file begins with; the last byte is the version.
+/// First bytes of a border file. The last one is the version.
 const MAGIC: &[u8; 8] = b"hlodbrd\x01";
 
 impl RecordedBorder {
-    /// Of the sides of a block.
+    /// Records the borders on the sides of a block.
     pub fn of<'a>(faces: impl Iterator<Item = &'a FaceBorder>) -> Self {
         let face = |face: &FaceBorder| RecordedFace {
             axis: face.plane.axis,
@@ -42,7 +42,7 @@ impl RecordedBorder {
         Self { faces: faces.filter(|face| !face.edges.is_empty()).map(face).collect() }
     }
 
-    /// As a file has it, little-endian.
+    /// Serialises the borders, little-endian.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         bytes.extend((self.faces.len() as u32).to_le_bytes());

@@ -14,7 +14,7 @@ use crate::mesh::{key, wide};
 pub struct AxisPlane {
     /// 0, 1 or 2.
     pub axis: usize,
-    /// Where it meets that axis.
+    /// Coordinate on that axis.
     pub at: f64,
 }
 
@@ -27,7 +27,7 @@ pub struct Place {
     pub weights: [f64; 3],
 }
 
-/// What a straight line across a triangle follows.
+/// A straight line across a triangle: one of its edges, or the intersection with a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Line {
     /// The edge from this corner to the next.
@@ -41,7 +41,7 @@ pub enum Line {
 pub struct Triangle {
     /// Source coordinates.
     pub corners: [[f64; 3]; 3],
-    /// Where places are rounded to.
+    /// Intersections are rounded to this lattice.
     pub lattice: Lattice,
 }
 
@@ -53,7 +53,7 @@ impl Triangle {
         Place { position: self.corners[number], weights }
     }
 
-    /// Where a line meets a plane that its ends lie on either side of.
+    /// Returns the intersection of a line with a plane that separates its ends.
     pub fn crossing(&self, line: Line, plane: AxisPlane) -> Place {
         match line {
             Line::Edge(from) => self.on_edge(from, plane),
@@ -61,7 +61,7 @@ impl Triangle {
         }
     }
 
-    /// Where the edge from a corner to the next meets a plane.
+    /// Returns the intersection of the edge from a corner to the next with a plane.
     fn on_edge(&self, from: usize, plane: AxisPlane) -> Place {
         let to = (from + 1) % 3;
         let is_first = key(self.corners[from]) <= key(self.corners[to]);
@@ -69,7 +69,7 @@ impl Triangle {
         self.between(self.corner(low), self.corner(high), &[plane])
     }
 
-    /// Where two planes across different axes meet the triangle.
+    /// Returns the intersection of the triangle with two planes across different axes.
     fn within(&self, one: AxisPlane, other: AxisPlane) -> Place {
         let [first, second] = if one.axis < other.axis { [one, other] } else { [other, one] };
         let along = |[from, to]: [Place; 2], planes: &[AxisPlane]| {
@@ -114,18 +114,18 @@ impl Triangle {
         Some([ends.next()?, ends.next()?])
     }
 
-    /// Of each corner, whether it is below a plane (-1), on it or above it.
+    /// Returns for each corner -1 below a plane, 0 on it, 1 above it.
     pub fn sides(&self, plane: AxisPlane) -> [i8; 3] {
         self.corners.map(|corner| side(corner[plane.axis], plane.at))
     }
 
-    /// Its corners.
+    /// Returns the corners.
     pub fn wide(&self) -> [DVec3; 3] {
         self.corners.map(wide)
     }
 }
 
-/// Whether a coordinate is below another (-1), equal or above.
+/// Returns -1 below a plane's coordinate, 0 on it, 1 above it.
 pub fn side(coordinate: f64, at: f64) -> i8 {
     i8::from(coordinate > at) - i8::from(coordinate < at)
 }

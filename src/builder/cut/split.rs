@@ -20,7 +20,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::builder::border::chain::{BorderVertex, CutPlane, KeepRule};
 use crate::builder::border::rank::SurfaceQuadric;
 use crate::builder::border::vertex::{Border, Path};
-use crate::builder::cut::uncut::UncutComponents;
+use crate::builder::cut::uncut::WholeComponents;
 use crate::lattice::Lattice;
 use crate::mesh::{Coordinate, Mesh, Normal, PositionKey, all_differ, key, renumber, wide};
 
@@ -76,7 +76,7 @@ pub struct Cut<'a, C> {
     /// See [`CutTolerance`].
     pub tolerance: CutTolerance,
     /// What is not cut but goes to one side.
-    pub whole: UncutComponents,
+    pub whole: WholeComponents,
     /// How many of the new border's vertices each level keeps.
     pub rule: &'a KeepRule<'a>,
 }

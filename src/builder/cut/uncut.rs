@@ -12,7 +12,7 @@ use crate::mesh::{Coordinate, DisjointSet, Mesh, PositionKey, key};
 
 /// Bodies up to this size stay whole.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct UncutComponents {
+pub struct WholeComponents {
     /// The most that they extend across the plane, metres; 0 where all are cut.
     pub extent: f64,
     /// The most triangles that they have.
@@ -29,7 +29,7 @@ struct Body {
     open: bool,
 }
 
-impl UncutComponents {
+impl WholeComponents {
     /// Those small beside slabs of `width` metres, with so many triangles at most.
     pub fn in_slabs(width: f64, triangles: usize, constants: &CutConstants) -> Self {
         Self { extent: width * constants.uncut, triangles }
@@ -129,7 +129,7 @@ mod tests {
         strip(&mut mesh, -8, 8, 10.0);
         strip(&mut mesh, 1, 3, 15.0);
         let sides = |extent, triangles, at: f32| {
-            let found = UncutComponents { extent, triangles }.sides(&mesh, 0, at);
+            let found = WholeComponents { extent, triangles }.sides(&mesh, 0, at);
             let of = |low: f32| {
                 let mut sides: Vec<bool> = found
                     .iter()

@@ -13,7 +13,7 @@ use crate::format::{
     Encoding, NODES_DIR, NodeId, NodeImageData, NodeLabel, NodeMesh, OutputDir, file_crc,
     write_glb_encoded,
 };
-use crate::mesh::{Kept, Mesh, UpAxis, Warnings};
+use crate::mesh::{Mesh, OutlineCoverage, UpAxis, Warnings};
 use crate::texture::{AppendedSkirts, BakeReason, BakedMesh, BlockTextures, TexturedNode};
 use crate::{Error, Result};
 
@@ -191,7 +191,7 @@ fn over_budget(node: &NodeDraft, triangles: usize) -> Option<String> {
     {
         return None;
     }
-    if let Some(Kept { area, skyline, .. }) = node.within_budget {
+    if let Some(OutlineCoverage { area, skyline, .. }) = node.within_budget {
         let percent = |share: Option<f64>| 100.0 * share.unwrap_or(1.0);
         return Some(format!(
             "within its budget it keeps {:.1} % of the covered ground and {:.1} % of the skyline",

@@ -10,7 +10,7 @@ use crate::mesh::{Mesh, PositionKey, key};
 /// A triangle of one mesh: the number of its leaf times eight, and its lane.
 pub(super) type Slot = u32;
 
-/// In place of a neighbour: none of the edge's other triangles continues this one.
+/// Marks an edge across which no triangle continues this one.
 const NONE: Slot = u32::MAX;
 
 /// Edges with more triangles than this are left without neighbours: pairing them takes time in
@@ -25,21 +25,21 @@ const TURNED: f32 = 0.5;
 #[derive(Debug, Default)]
 pub(super) struct Adjacency {
     /// One to a slot; those that are not used have no neighbours.
-    pub triangles: Vec<Linked>,
+    pub triangles: Vec<TriangleAdjacency>,
     /// Edges that one triangle has.
     open: Vec<OpenEdge>,
 }
 
 /// What a walk over the surface needs of a triangle, side by side in memory.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Linked {
+pub(super) struct TriangleAdjacency {
     /// As the mesh has them: three of x, of y and of z.
     pub corners: [[f32; 3]; 3],
     /// Across the edges from the first corner on.
     across: [Slot; 3],
 }
 
-impl Linked {
+impl TriangleAdjacency {
     const UNUSED: Self = Self { corners: [[0.0; 3]; 3], across: [NONE; 3] };
 
     /// The triangle across an edge.
@@ -82,7 +82,7 @@ impl Adjacency {
             (0..3).for_each(|edge| edges.count(ends(corners, edge, &places)));
         }
         edges.allot();
-        let mut triangles = vec![Linked::UNUSED; leaves.len() * LANES];
+        let mut triangles = vec![TriangleAdjacency::UNUSED; leaves.len() * LANES];
         for (slot, triangle) in slots(leaves) {
             let corners = mesh.triangles[triangle as usize];
             for edge in 0..3 {
@@ -116,7 +116,7 @@ impl Adjacency {
     }
 }
 
-fn link(triangles: &mut [Linked], (a, of_a): (Slot, u8), (b, of_b): (Slot, u8)) {
+fn link(triangles: &mut [TriangleAdjacency], (a, of_a): (Slot, u8), (b, of_b): (Slot, u8)) {
     triangles[a as usize].across[usize::from(of_a)] = b;
     triangles[b as usize].across[usize::from(of_b)] = a;
 }
@@ -124,7 +124,7 @@ fn link(triangles: &mut [Linked], (a, of_a): (Slot, u8), (b, of_b): (Slot, u8)) 
 /// Pairs the triangles of an edge that continue each other: flat ones first, of equally flat ones
 /// those that face the same way. Where each face is there twice, both sides are so surfaces of
 /// their own. An overlay is sound with any pairs: no triangle is in two.
-fn continuing(triangles: &[Linked], edges: &[(Slot, u8)]) -> Vec<[(Slot, u8); 2]> {
+fn continuing(triangles: &[TriangleAdjacency], edges: &[(Slot, u8)]) -> Vec<[(Slot, u8); 2]> {
     let away: Vec<(Vec3, Vec3)> =
         edges.iter().map(|&(slot, edge)| triangles[slot as usize].away_from(edge.into())).collect();
     let mut pairs: Vec<(f32, [usize; 2])> = Vec::new();
@@ -235,7 +235,7 @@ mod tests {
     use super::super::tests::mesh;
     use super::*;
 
-    /// Of each triangle the one across the edge from vertex 0 to vertex 1.
+    /// Returns for each triangle its neighbour across the edge from vertex 0 to vertex 1.
     fn across(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<Option<usize>> {
         let mesh = mesh(positions, triangles);
         let (_, leaves) = Bvh::new(&mesh);

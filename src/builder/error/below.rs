@@ -1,7 +1,7 @@
-//! What a node is measured against.
+//! The surface that a node is measured against.
 //!
 //! The distance from the source itself would cost time in proportion to the source at every level.
-//! So a node is measured against nodes below it, each with the bound of its own distance from the
+//! Instead a node is measured against nodes below it, each with the bound of its own distance from the
 //! source, and the two are added up place by place (the triangle inequality). The sum is close to
 //! the true distance if the bounds are small against it. One level below they are not: a node is
 //! not much farther from the source than its children are. The mean and the percentile are averages
@@ -11,7 +11,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
 
-use super::original::Original;
+use super::searchable_surface::SearchableSurface;
 use super::stored::SurfaceError;
 
 /// A node whose bound exceeds this share of the largest bound among the children of the node that
@@ -19,15 +19,15 @@ use super::stored::SurfaceError;
 /// those of a city of houses were 1.6 times the measured distance in the median of the nodes above blocks.
 const LARGE: f64 = 0.0625;
 
-/// Above this number of triangles, no more nodes are replaced by their children: otherwise memory
+/// Beyond this number of triangles no more nodes are replaced by their children: otherwise memory
 /// and time for one node could grow with the source. The bound is looser then, but holds.
 const MOST_TRIANGLES: usize = 1 << 17;
 
-/// What is below a node.
+/// The surfaces below a node.
 #[derive(Debug)]
 pub struct Below {
     /// The source, or the surfaces nearest to it that are at hand.
-    pub source: Arc<Original>,
+    pub source: Arc<SearchableSurface>,
     /// The distance of `source` from the source itself, to be added to what is measured.
     pub off: SurfaceError,
     /// The node's children.
@@ -37,41 +37,41 @@ pub struct Below {
 /// The surface of a node, with those below it.
 #[derive(Debug)]
 pub struct Surface {
-    original: Arc<Original>,
-    /// Of its distance from the source, metres.
+    original: Arc<SearchableSurface>,
+    /// Upper bound of the distance to the source, metres.
     bound: f64,
     children: Vec<Self>,
 }
 
 impl Surface {
     /// One that has no children.
-    pub fn new(original: Arc<Original>, bound: f64) -> Self {
+    pub fn new(original: Arc<SearchableSurface>, bound: f64) -> Self {
         Self { original, bound, children: Vec::new() }
     }
 }
 
 impl Below {
     /// Source triangles without nodes, which rounding moved by `moved` metres at most.
-    pub fn source(source: Original, moved: f64) -> Self {
+    pub fn source(source: SearchableSurface, moved: f64) -> Self {
         let source = Arc::new(source);
         let nodes = vec![Surface::new(Arc::clone(&source), 0.0)];
         Self { source, off: SurfaceError::everywhere(moved), nodes }
     }
 
-    /// Those of siblings, below their parent.
+    /// Joins those of siblings: what their parent is measured against.
     pub fn join(siblings: Vec<Self>) -> Self {
         let sources: Vec<_> = siblings.iter().map(|below| Arc::clone(&below.source)).collect();
         let moved = siblings.iter().map(|below| below.off.bound).fold(0.0, f64::max);
         Self {
-            source: Arc::new(Original::union(&sources)),
+            source: Arc::new(SearchableSurface::union(&sources)),
             off: SurfaceError::everywhere(moved),
             nodes: siblings.into_iter().flat_map(|below| below.nodes).collect(),
         }
     }
 
     /// One level further up: below the parent of a node with this surface and bound.
-    pub fn above(self, node: Original, bound: f64) -> Self {
-        let original = Arc::new(node.with_off(bound));
+    pub fn above(self, node: SearchableSurface, bound: f64) -> Self {
+        let original = Arc::new(node.with_surface_offset(bound));
         Self { nodes: vec![Surface { original, bound, children: self.nodes }], ..self }
     }
 
@@ -80,11 +80,11 @@ impl Below {
         largest_bound(&self.nodes)
     }
 
-    /// What the node is measured against.
-    pub(super) fn surface(&self) -> Original {
+    /// Returns the surface that the node is measured against.
+    pub(super) fn surface(&self) -> SearchableSurface {
         let nodes = measured_against(&self.nodes);
         let originals: Vec<_> = nodes.iter().map(|node| Arc::clone(&node.original)).collect();
-        Original::union(&originals)
+        SearchableSurface::union(&originals)
     }
 }
 
@@ -130,7 +130,7 @@ pub fn measured_against<N: BoundedNode>(children: &[N]) -> Vec<&N> {
         }
     }
     let mut triangles: usize = nodes.iter().map(|node| node.triangles()).sum();
-    // By bound, which is not negative; of equal ones the first.
+    // Sorted by bound, which is not negative, then by number.
     let entry = |number: usize, node: &N| (node.bound().to_bits(), Reverse(number));
     let entries = nodes.iter().enumerate().map(|(number, node)| entry(number, node));
     let mut largest: BinaryHeap<_> = entries.collect();

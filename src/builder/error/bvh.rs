@@ -130,7 +130,7 @@ impl Box3 {
         self.low.x > self.high.x
     }
 
-    /// Whether it is within `reach` of another box along each axis.
+    /// Returns whether the distance to another box is at most `reach` along each axis.
     pub fn is_within(&self, reach: f32, other: Self) -> bool {
         let apart = (self.low - other.high).max(other.low - self.high);
         apart.max_element() <= reach

@@ -9,9 +9,9 @@
 
 use glam::DVec3;
 
-use super::directed::TIGHTNESS;
-use super::original::{Original, Search, TriangleId};
+use super::one_sided_hausdorff::TIGHTNESS;
 use super::polygon::{Clipped, MOST_CORNERS, Polygon, bisect, centroid, clip};
+use super::searchable_surface::{Search, SearchableSurface, TriangleId};
 use super::triangle::Frame;
 
 /// Distances up to this share of the largest coordinate count as none: a tenth of what rounding
@@ -39,7 +39,11 @@ pub(super) struct Exact {
 const MOST_LEAVES: usize = 256;
 
 /// The largest distance both ways, and from `beside` to `a`. `None` where it would take too long.
-pub(super) fn both_ways(a: &Original, b: &Original, beside: &Original) -> Option<Exact> {
+pub(super) fn both_ways(
+    a: &SearchableSurface,
+    b: &SearchableSurface,
+    beside: &SearchableSurface,
+) -> Option<Exact> {
     let magnitude = [a, b, beside].map(|surface| surface.bounds.magnitude());
     let magnitude = magnitude.into_iter().fold(0.0, f32::max).into();
     let there = Walk::new(b, magnitude).over(a)?;
@@ -50,7 +54,7 @@ pub(super) fn both_ways(a: &Original, b: &Original, beside: &Original) -> Option
 
 /// The search for the point that is farthest from a surface.
 struct Walk<'a> {
-    to: &'a Original,
+    to: &'a SearchableSurface,
     search: Search<'a>,
     /// The largest distance found at a point.
     found: f64,
@@ -62,7 +66,7 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    fn new(to: &'a Original, magnitude: f64) -> Self {
+    fn new(to: &'a SearchableSurface, magnitude: f64) -> Self {
         let near = Frame::new([DVec3::INFINITY; 3]);
         Self { to, search: Search::new(to), found: 0.0, settled: 0.0, near, magnitude }
     }
@@ -125,7 +129,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Settles all triangles of a surface.
-    fn over(mut self, from: &Original) -> Option<Self> {
+    fn over(mut self, from: &SearchableSurface) -> Option<Self> {
         // One corner of each first, so that most limits are known when triangles are clipped.
         for id in from.ids() {
             let [corner, ..] = from.exact_corners(id)?;
@@ -212,7 +216,7 @@ mod tests {
     }
 
     /// The largest distance from vertices of one mesh to another, by trying all triangles.
-    fn of_vertices(from: &crate::mesh::Mesh, to: &Original) -> f64 {
+    fn of_vertices(from: &crate::mesh::Mesh, to: &SearchableSurface) -> f64 {
         let frames: Vec<Frame> =
             to.ids().map(|id| Frame::new(to.exact_corners(id).unwrap())).collect();
         let distance = |&at: &[f32; 3]| {

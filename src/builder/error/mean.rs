@@ -2,14 +2,14 @@
 
 use glam::Vec3;
 
-use super::original::{Original, Search};
+use super::searchable_surface::{Search, SearchableSurface};
 use crate::builder::constants::MeasureConstants;
 use crate::mesh::Mesh;
 
 /// A mesh that others are compared with.
 pub struct MeanDistance {
     /// Others are measured to this surface.
-    surface: Original,
+    surface: SearchableSurface,
     /// They are measured from these points.
     points: Vec<Vec3>,
     constants: MeasureConstants,
@@ -18,7 +18,7 @@ pub struct MeanDistance {
 impl MeanDistance {
     /// Of distances from this mesh.
     pub fn from(mesh: &Mesh, constants: MeasureConstants) -> Self {
-        let surface = Original::of_points(mesh, constants);
+        let surface = SearchableSurface::of_points(mesh, constants);
         let points = surface.samples();
         Self { surface, points, constants }
     }
@@ -40,7 +40,7 @@ impl MeanDistance {
     }
 }
 
-fn mean(points: &[Vec3], surface: &Original, limit: f64) -> f64 {
+fn mean(points: &[Vec3], surface: &SearchableSurface, limit: f64) -> f64 {
     let mut search = Search::new(surface);
     let count = points.len() as f64;
     let mut sum = 0.0;

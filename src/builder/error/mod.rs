@@ -1,9 +1,9 @@
 //! The two-sided distance between a node and the source, bounded and measured.
 //!
 //! - [`Below`]: what a node is measured against
-//! - [`Original`]: a surface that is searched, of one mesh or of several
+//! - [`SearchableSurface`]: a surface that is searched, of one mesh or of several
 //! - `bvh`, `triangle`: its hierarchy, and eight triangles at a time
-//! - `directed`, `polygon`: the bound on the largest distance, one way
+//! - `one_sided_hausdorff`, `polygon`: the bound on the largest distance, one way
 //! - `exact`: the same in f64, for surfaces that f32 cannot tell apart
 //! - `overlay`, `adjacency`: proving that a triangle is near by walking over the other surface
 //! - `samples`: points for the mean, and [`MeanDistance`] to choose among meshes by it
@@ -11,24 +11,24 @@
 mod adjacency;
 mod below;
 mod bvh;
-mod directed;
 mod exact;
 mod mean;
 mod nearest;
-mod original;
+mod one_sided_hausdorff;
 mod overlay;
 mod polygon;
 mod samples;
+mod searchable_surface;
 mod stored;
 mod triangle;
 
 pub use self::below::{Below, BoundedNode, Surface, measured_against};
-pub use self::directed::TIGHTNESS;
-use self::directed::{Directed, Largest, seed};
 pub use self::mean::MeanDistance;
 pub use self::nearest::NearestTriangle;
-use self::original::Search;
-pub use self::original::{Face, Original};
+pub use self::one_sided_hausdorff::TIGHTNESS;
+use self::one_sided_hausdorff::{MaxDistance, OneSidedHausdorff, seed};
+use self::searchable_surface::Search;
+pub use self::searchable_surface::{Face, SearchableSurface};
 pub use self::stored::SurfaceError;
 
 /// [`SurfaceError`], and how it was found.
@@ -53,7 +53,7 @@ pub struct Measured {
 /// Where only one of them has triangles, all numbers are the diagonal of its bounding box: as far
 /// as anything that is drawn in place of it could be wrong. Infinite where coordinates are not
 /// finite.
-pub fn measure(below: &Below, node: &Original, beside: &Original) -> Measured {
+pub fn measure(below: &Below, node: &SearchableSurface, beside: &SearchableSurface) -> Measured {
     let (source, surface) = (&below.source, &below.surface());
     let all = |distance: f64| {
         let error = SurfaceError::everywhere(distance);
@@ -68,20 +68,24 @@ pub fn measure(below: &Below, node: &Original, beside: &Original) -> Measured {
         return all(surface.diagonal().max(node.diagonal()).max(below.bound()));
     }
     let least = (LEAST_ROUNDING * rounding).max(below.bound() as f32);
-    let mut largest = Largest::at_least(least);
+    let mut largest = MaxDistance::at_least(least);
     seed(surface, node, &mut largest);
     seed(node, surface, &mut largest);
     if !beside.is_empty() {
-        (largest, _) = Directed::new(beside, surface, largest, rounding).run();
+        (largest, _) = OneSidedHausdorff::new(beside, surface, largest, rounding).run();
     }
     // This way first: each of its triangles settles several of those below.
-    let (largest, marks) = Directed::new(node, surface, largest, rounding).run();
-    let (largest, _) = Directed::new(surface, node, largest, rounding).with_marks(marks).run();
+    let (largest, visit_states) = OneSidedHausdorff::new(node, surface, largest, rounding).run();
+    let (largest, _) = OneSidedHausdorff::new(surface, node, largest, rounding)
+        .with_visit_states(visit_states)
+        .run();
     let bound = f64::from(largest.bound()) * (1.0 + RELATIVE_ROUNDING) + f64::from(rounding);
     let is_near = largest.found <= NEAR_ROUNDING * rounding;
     let exact = is_near.then(|| exact::both_ways(surface, node, beside)).flatten();
     let (found, bound) = match exact {
-        Some(exact) => (exact.found, bound.min(exact.bound + f64::from(surface.most_off()))),
+        Some(exact) => {
+            (exact.found, bound.min(exact.bound + f64::from(surface.max_surface_offset())))
+        }
         None => (largest.found.into(), bound),
     };
     let bound = bound.max(below.bound());
@@ -100,7 +104,7 @@ const RELATIVE_ROUNDING: f64 = 32.0 / (1 << 24) as f64;
 /// By how much a distance may be wrong beside [`RELATIVE_ROUNDING`]: coordinates of points that are
 /// measured are rounded once, and what is computed from differences of coordinates, which are exact
 /// to a last bit of themselves, a dozen times.
-fn rounding(a: &Original, b: &Original) -> f32 {
+fn rounding(a: &SearchableSurface, b: &SearchableSurface) -> f32 {
     let magnitude = a.bounds.magnitude().max(b.bounds.magnitude());
     f32::EPSILON * (magnitude + 12.0 * a.longest.max(b.longest))
 }
@@ -113,7 +117,7 @@ const LEAST_ROUNDING: f32 = 2.0 * TIGHTNESS;
 const NEAR_ROUNDING: f32 = 8.0;
 
 /// Mean, root mean square and 95th percentile of sampled distances, none above `bound`.
-fn statistics(a: &Original, b: &Original, bound: f64) -> (f64, f64, f64) {
+fn statistics(a: &SearchableSurface, b: &SearchableSurface, bound: f64) -> (f64, f64, f64) {
     let mut distances = Vec::new();
     for (from, to) in [(a, b), (b, a)] {
         let mut search = Search::new(to);

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::bvh::Bvh;
-use super::original::{Original, Search};
+use super::searchable_surface::{Search, SearchableSurface};
 use super::triangle::LANES;
 use crate::builder::constants::MeasureConstants;
 use crate::mesh::Mesh;
@@ -11,7 +11,7 @@ use crate::mesh::Mesh;
 /// A mesh to be searched.
 #[derive(Debug)]
 pub struct NearestTriangle {
-    surface: Original,
+    surface: SearchableSurface,
     /// The mesh's triangle in each slot.
     numbers: Vec<u32>,
 }
@@ -29,7 +29,7 @@ impl NearestTriangle {
             // Lanes that are left over hold the first triangle again.
             numbers[leaf * LANES + members.len()..(leaf + 1) * LANES].fill(members[0]);
         }
-        Some(Self { surface: Original::of_bvh(bvh, MeasureConstants::default()), numbers })
+        Some(Self { surface: SearchableSurface::of_bvh(bvh, MeasureConstants::default()), numbers })
     }
 
     /// Answers one question after another, faster where points are near each other.

@@ -12,8 +12,8 @@
 
 use glam::{Vec2, Vec3, Vec3A, Vec3Swizzles};
 
-use super::adjacency::{Linked, Links, Slot};
-use super::original::{Original, TriangleId};
+use super::adjacency::{Links, Slot, TriangleAdjacency};
+use super::searchable_surface::{SearchableSurface, TriangleId};
 use super::triangle::{Triangle, max, min};
 use crate::builder::constants::MeasureConstants;
 
@@ -27,9 +27,9 @@ const COUNTED_AT: [f32; 3] = [0.293, 0.331, 0.376];
 
 /// What walks have told of a triangle that they visited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Mark(u32);
+pub(super) struct VisitState(u32);
 
-impl Mark {
+impl VisitState {
     const NONE: Self = Self(u32::MAX);
     const SETTLED: Self = Self(u32::MAX - 1);
 
@@ -49,17 +49,17 @@ impl Mark {
 }
 
 /// Of the triangles of a surface, what walks have told.
-pub(super) struct Marks {
+pub(super) struct VisitStates {
     /// Of each part the number of its first slot.
     firsts: Vec<usize>,
     /// Of each slot, which walk visited it last, and what is known.
-    slots: Vec<(u32, Mark)>,
+    slots: Vec<(u32, VisitState)>,
     /// No point of a triangle that is marked as settled is farther, its off included.
     pub farthest: f32,
 }
 
-impl Marks {
-    fn new(original: &Original) -> Self {
+impl VisitStates {
+    fn new(original: &SearchableSurface) -> Self {
         let mut count = 0;
         let firsts = original.parts.iter().map(|part| {
             let first = count;
@@ -67,20 +67,20 @@ impl Marks {
             first
         });
         let firsts = firsts.collect();
-        Self { firsts, slots: vec![(0, Mark::NONE); count], farthest: 0.0 }
+        Self { firsts, slots: vec![(0, VisitState::NONE); count], farthest: 0.0 }
     }
 
     /// Of a triangle.
-    pub fn of(&self, id: TriangleId) -> Mark {
+    pub fn of(&self, id: TriangleId) -> VisitState {
         self.slots[self.firsts[id.part as usize] + id.slot() as usize].1
     }
 }
 
 /// Visits triangles of a surface.
 pub(super) struct Overlay<'a> {
-    original: &'a Original,
+    original: &'a SearchableSurface,
     links: &'a Links,
-    marks: Marks,
+    visit_states: VisitStates,
     now: u32,
     queue: Vec<Visited>,
 }
@@ -94,14 +94,14 @@ struct Visited {
 }
 
 impl<'a> Overlay<'a> {
-    pub fn new(original: &'a Original) -> Self {
-        let (links, marks) = (original.links(), Marks::new(original));
-        Self { original, links, marks, now: 0, queue: Vec::new() }
+    pub fn new(original: &'a SearchableSurface) -> Self {
+        let (links, visit_states) = (original.links(), VisitStates::new(original));
+        Self { original, links, visit_states, now: 0, queue: Vec::new() }
     }
 
     /// What was learnt of the surface that was walked over.
-    pub fn into_marks(self) -> Marks {
-        self.marks
+    pub fn into_visit_states(self) -> VisitStates {
+        self.visit_states
     }
 
     /// A bound on the distance of all points of a triangle, not above `limit`, if there is one to be
@@ -133,17 +133,17 @@ impl<'a> Overlay<'a> {
             let linked = &self.original.parts[part as usize].adjacency.triangles[other as usize];
             let seen = base.seen(linked);
             is_covered ^= seen.covers(base.counted_at, margin)?;
-            let mark = &mut self.marks.slots[number].1;
-            if *mark != Mark::SETTLED {
+            let mark = &mut self.visit_states.slots[number].1;
+            if *mark != VisitState::SETTLED {
                 if seen.is_near(&base, most) {
-                    *mark = Mark::SETTLED;
+                    *mark = VisitState::SETTLED;
                     // Also where the walk fails, and its bound counts for nothing.
                     let height = seen.height.abs().max_element() + margin;
                     let off = self.original.off(part);
                     let farthest = min(limit, height.hypot(limit * aside)) + off;
-                    self.marks.farthest = max(self.marks.farthest, farthest);
-                } else if *mark == Mark::NONE || seen.is_centred() {
-                    *mark = Mark::near(slot);
+                    self.visit_states.farthest = max(self.visit_states.farthest, farthest);
+                } else if *mark == VisitState::NONE || seen.is_centred() {
+                    *mark = VisitState::near(slot);
                 }
             }
             highest = max(highest, seen.height_within(&base, most, margin)?);
@@ -168,8 +168,8 @@ impl<'a> Overlay<'a> {
 
     #[inline(always)]
     fn visit(&mut self, part: u32, slot: Slot) {
-        let number = self.marks.firsts[part as usize] + slot as usize;
-        let visited = &mut self.marks.slots[number].0;
+        let number = self.visit_states.firsts[part as usize] + slot as usize;
+        let visited = &mut self.visit_states.slots[number].0;
         if *visited != self.now {
             *visited = self.now;
             self.queue.push(Visited { part, slot, number });
@@ -220,7 +220,7 @@ impl Base {
 
     /// Another triangle, seen along the normal.
     #[inline(always)]
-    fn seen(&self, other: &Linked) -> Seen {
+    fn seen(&self, other: &TriangleAdjacency) -> Seen {
         let [x, y, z] = [0, 1, 2].map(|axis| Vec3A::from_array(other.corners[axis]));
         let [x, y, z] = [x - self.origin.x, y - self.origin.y, z - self.origin.z];
         let along = |way: Vec3| x * way.x + y * way.y + z * way.z;

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::bvh::Bvh;
-use super::original::Original;
+use super::searchable_surface::SearchableSurface;
 use crate::builder::constants::MeasureConstants;
 
 /// Points of one mesh, each for as much area as any other, in the order of the leaves of its
@@ -40,7 +40,7 @@ impl Samples {
     }
 }
 
-impl Original {
+impl SearchableSurface {
     /// Points from each part, as many as its area asks for; none where there is no area.
     pub(super) fn samples(&self) -> Vec<Vec3> {
         let area: f64 = self.parts.iter().map(|part| part.samples.area).sum();

@@ -1,16 +1,16 @@
 //! What a node stores of its error.
 
-/// How far two surfaces are apart, metres, both ways.
+/// The two-sided distance between two surfaces, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfaceError {
     /// No point of one surface is farther from the other (an upper bound of the Hausdorff
     /// distance). 0 where they are equal to within a tenth of what rounding coordinates to f32 does.
     pub bound: f64,
-    /// Of points of both surfaces, evenly spread by area, half of them of each: the mean distance.
+    /// Mean distance of points spread evenly by area, half of them on each surface.
     pub mean: f64,
-    /// Of the same points: the root of the mean squared distance.
+    /// Root mean square of the same distances.
     pub rms: f64,
-    /// Of the same points: 95 of 100 are not farther.
+    /// 95th percentile of the same distances.
     pub p95: f64,
 }
 

@@ -14,17 +14,17 @@ fn point(random: &mut Random, size: f32) -> [f32; 3] {
 }
 
 /// To be measured with the constants that builds use.
-pub(super) fn surface_of(mesh: &Mesh) -> Original {
-    Original::of(mesh, MeasureConstants::default())
+pub(super) fn surface_of(mesh: &Mesh) -> SearchableSurface {
+    SearchableSurface::of(mesh, MeasureConstants::default())
 }
 
 /// Measures a mesh against a source.
-pub(super) fn measure(source: &Original, mesh: &Mesh) -> Measured {
+pub(super) fn measure(source: &SearchableSurface, mesh: &Mesh) -> Measured {
     let (below, none) = (Below::source(source.clone(), 0.0), surface_of(&Mesh::default()));
     super::measure(&below, &surface_of(mesh), &none)
 }
 
-pub(super) fn surface_error(source: &Original, mesh: &Mesh) -> SurfaceError {
+pub(super) fn surface_error(source: &SearchableSurface, mesh: &Mesh) -> SurfaceError {
     measure(source, mesh).error
 }
 
@@ -207,7 +207,7 @@ fn nothing_is_as_far_as_what_it_stands_for_is_large() {
     assert_eq!(surface_error(&some, &Mesh::default()).bound, diagonal);
     assert_eq!(surface_error(&none, &flat).bound, diagonal);
     assert_eq!(surface_error(&none, &Mesh::default()), SurfaceError::default());
-    assert!(Original::union(&[]).is_empty());
+    assert!(SearchableSurface::union(&[]).is_empty());
 }
 
 /// A hole in the middle of a triangle whose corners all stay, which no vertex is far from.
@@ -288,9 +288,10 @@ fn a_union_is_as_its_parts_in_one() {
         all.materials.resize(all.positions.len(), 0);
         all.triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
     }
-    let some: Vec<Arc<Original>> = parts.iter().map(|part| Arc::new(surface_of(part))).collect();
-    let parts = [&some[..4], &some[4..], &[]].map(|part| Arc::new(Original::union(part)));
-    let nested = Original::union(&parts);
+    let some: Vec<Arc<SearchableSurface>> =
+        parts.iter().map(|part| Arc::new(surface_of(part))).collect();
+    let parts = [&some[..4], &some[4..], &[]].map(|part| Arc::new(SearchableSurface::union(part)));
+    let nested = SearchableSurface::union(&parts);
     assert_eq!(nested.triangle_count(), all.triangles.len());
     let other = moved(&sheet(&mut random, 19, 0.5), [0.1, 0.2, 0.3]);
     let [one, of_parts] = [&surface_of(&all), &nested].map(|original| measure(original, &other));

@@ -5,20 +5,20 @@ use std::sync::Arc;
 use super::coarse::{CoarseNode, NodeSurface, Outcome};
 use super::node::NodeSink;
 use super::options::BorderMode;
-use super::outline::LeftOut;
+use super::outline::SkippedNode;
 use super::{BlockBuilder, source_of};
 use crate::Result;
 use crate::builder::border::span::BorderSpan;
 use crate::builder::border::vertex::Path;
 use crate::builder::cut::split::Chunk;
-use crate::builder::error::{Below, Original};
+use crate::builder::error::{Below, SearchableSurface};
 use crate::builder::stages::Stage;
 
 /// What a node is made of that stands above others.
 pub struct MemberSurfaces {
-    /// Their surfaces, without skirts; its planes have the border of the source.
+    /// Surfaces of the members without skirts. The planes have the border of the source.
     pub chunk: Chunk,
-    /// What the node is measured against.
+    /// The surface that the node is measured against.
     pub below: Below,
 }
 
@@ -29,11 +29,11 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         &self,
         members: MemberSurfaces,
         budget: usize,
-    ) -> Result<Result<S::Record, LeftOut>> {
+    ) -> Result<Result<S::Record, SkippedNode>> {
         let MemberSurfaces { chunk, below } = members;
         let Chunk { mut mesh, border, path, mut stitches, .. } = chunk;
         let constants = self.options.constants.measure;
-        let of_mesh = || Arc::new(Original::of(&source_of(&mesh, &stitches), constants));
+        let of_mesh = || Arc::new(SearchableSurface::of(&source_of(&mesh, &stitches), constants));
         let original = self.stages.time(Stage::Measure, of_mesh);
         mesh.triangles.append(&mut stitches);
         let spans = match self.options.borders {
@@ -45,7 +45,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let (outcome, _) = self.coarse_node(source, node)?;
         Ok(match outcome {
             Outcome::Written(record) => Ok(record),
-            Outcome::LeftOut(left_out) => Err(left_out),
+            Outcome::SkippedNode(left_out) => Err(left_out),
         })
     }
 }

@@ -6,14 +6,14 @@ use glam::DVec3;
 
 use super::BlockBuilder;
 use super::node::{Forest, NodeDraft, NodeSink, Tree};
-use super::outline::{LeftOut, SourceOutline, more_triangles};
+use super::outline::{SkippedNode, SourceOutline, more_triangles};
 use crate::Result;
 use crate::builder::border::skirt::{Skirt, skirts, triangles_of};
 use crate::builder::border::skirt_rules::SkirtRules;
 use crate::builder::border::span::{BorderSpan, join_spans};
 use crate::builder::border::thin::thin_border;
 use crate::builder::border::vertex::{Border, Path};
-use crate::builder::error::{Below, Original, measure};
+use crate::builder::error::{Below, SearchableSurface, measure};
 use crate::builder::simplify::cap::cap_sections;
 use crate::builder::simplify::compact::compact;
 use crate::builder::simplify::face_colors::with_face_colors;
@@ -23,7 +23,7 @@ use crate::builder::simplify::normal_sets::{NormalSets, weld_normals};
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::builder::simplify::weld_seams::weld_seams;
 use crate::builder::stages::Stage;
-use crate::mesh::{Kept, Mesh, all_differ};
+use crate::mesh::{Mesh, OutlineCoverage, all_differ};
 use crate::texture::BakeReason;
 
 /// Where simplification leaves nothing, so many of the largest triangles stay: a chunk must not
@@ -37,8 +37,8 @@ pub(super) struct NodeSurface {
     /// The spans of its border, if skirts are to cover them.
     pub spans: Vec<BorderSpan>,
     /// The surface whose outline and colours it keeps.
-    pub original: Arc<Original>,
-    /// What it is measured against.
+    pub original: Arc<SearchableSurface>,
+    /// The surface that the parent is measured against.
     pub below: Below,
     /// A texture of its own stands for its texture coordinates.
     pub baked: bool,
@@ -59,9 +59,9 @@ struct Attempt {
     /// Why it needs a texture of its own, where it does.
     reason: Option<BakeReason>,
     /// Of the source's outline.
-    kept: Kept,
+    kept: OutlineCoverage,
     /// What it would keep within its budget, where it was given more.
-    within_budget: Option<Kept>,
+    within_budget: Option<OutlineCoverage>,
 }
 
 /// A simplified mesh with its border.
@@ -80,7 +80,7 @@ struct NodeLadder<'a> {
     border: Border,
     normal_sets: Option<NormalSets>,
     spans: Vec<BorderSpan>,
-    /// Its thinned border needs so many.
+    /// Number of skirt triangles that the thinned border needs.
     skirt_triangles: usize,
     rules: SkirtRules,
     ladder: Ladder<'a>,
@@ -89,7 +89,7 @@ struct NodeLadder<'a> {
 /// How a coarse node ends.
 pub(super) enum Outcome<R> {
     Written(R),
-    LeftOut(LeftOut),
+    SkippedNode(SkippedNode),
 }
 
 impl<R> Outcome<R> {
@@ -104,7 +104,7 @@ impl<R> Outcome<R> {
             Self::Written(record) => {
                 forest.trees = vec![Tree { record, children: forest.trees }];
             }
-            Self::LeftOut(node) => forest.left_out.push(node),
+            Self::SkippedNode(node) => forest.left_out.push(node),
         }
         forest
     }
@@ -159,12 +159,13 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             let triangles = (mesh.triangles.len() + triangles_of(&skirts)) as u64;
             let child_path = node.child_path.to_vec();
             // Nobody draws it: what is above need not be farther off than what is below.
-            (Outcome::LeftOut(LeftOut { child_path, triangles, kept }), below)
+            (Outcome::SkippedNode(SkippedNode { child_path, triangles, kept }), below)
         } else {
             let constants = self.options.constants.measure;
             let (surface, error) = self.stages.time(Stage::Measure, || {
-                let surface = Original::of(&mesh, constants);
-                let beside = Original::of(&skirts_beside(&mesh, &skirts, node.path), constants);
+                let surface = SearchableSurface::of(&mesh, constants);
+                let beside =
+                    SearchableSurface::of(&skirts_beside(&mesh, &skirts, node.path), constants);
                 let error = measure(&below, &surface, &beside).error;
                 (surface, error)
             });
@@ -203,7 +204,8 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             .time(Stage::Measure, || SourceOutline::of(&source.original, self.up, constants));
         let kept_by = |coarse: &Coarse| {
             let mesh = &coarse.simplified.mesh;
-            let kept = || outline.as_ref().map_or_else(Kept::default, |o| o.kept_by(mesh));
+            let kept =
+                || outline.as_ref().map_or_else(OutlineCoverage::default, |o| o.kept_by(mesh));
             self.stages.time(Stage::Measure, kept)
         };
         let simplified = |ladder: &NodeLadder, budget: usize| {
@@ -225,8 +227,8 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         Attempt { coarse, reason, kept, within_budget }
     }
 
-    /// What a node is simplified by: within texture seams where these leave enough, and then the result for
-    /// its own budget; else without them. The node then needs a texture of its own, for the reason that is
+    /// Prepares the simplification of a node. If it reaches the budget within texture seams, that result is
+    /// returned, too. Otherwise seams are ignored, and the node needs a texture of its own: the reason is
     /// returned.
     fn ladder(
         &self,

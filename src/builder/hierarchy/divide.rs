@@ -6,7 +6,7 @@ use super::options::{BorderMode, TreeShape};
 use crate::builder::border::chain::KeepRule;
 use crate::builder::cut::plane::{Region, best_plane};
 use crate::builder::cut::split::{Chunk, Cut, cut};
-use crate::builder::cut::uncut::UncutComponents;
+use crate::builder::cut::uncut::WholeComponents;
 use crate::mesh::Mesh;
 
 /// The box of a chunk without what small components reach beyond the planes that it was cut at
@@ -150,7 +150,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             coordinate,
             lattice: Some(self.lattice),
             tolerance: self.options.tolerance,
-            whole: UncutComponents::in_slabs(width, most, &self.options.constants.cut),
+            whole: WholeComponents::in_slabs(width, most, &self.options.constants.cut),
             rule,
         }
     }

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 pub use self::above::MemberSurfaces;
 pub use self::node::{Forest, NodeDraft, NodeSink, Tree};
 pub use self::options::{BorderMode, HierarchyOptions, TreeShape};
-pub use self::outline::LeftOut;
+pub use self::outline::SkippedNode;
 pub use self::shape::Resolutions;
 
 use self::coarse::{CoarseNode, NodeSurface};
@@ -29,8 +29,8 @@ use crate::Result;
 use crate::builder::border::span::original_spans;
 use crate::builder::border::vertex::Border;
 use crate::builder::cut::split::Chunk;
-use crate::builder::error::{Below, Original, SurfaceError};
-use crate::builder::simplify::aggregate::{BodyRules, Extrudable, has_many_bodies};
+use crate::builder::error::{Below, SearchableSurface, SurfaceError};
+use crate::builder::simplify::aggregate::{ComponentRules, Extrudable, has_many_bodies};
 use crate::builder::simplify::merge::merge;
 use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::{Stage, Stages};
@@ -80,10 +80,10 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
     }
 
     /// What counts as a body in any node of the block.
-    fn bodies(&self) -> BodyRules<'_> {
+    fn bodies(&self) -> ComponentRules<'_> {
         let is_baked = self.bake.is_some_and(|plan| plan.always.is_some());
         let extrudable = self.extrudable.materials(is_baked);
-        BodyRules { up: self.up, extrudable, constants: &self.options.constants.prisms }
+        ComponentRules { up: self.up, extrudable, constants: &self.options.constants.prisms }
     }
 
     /// How far rounding has moved a chunk off the source, metres at most, where that shows.
@@ -200,7 +200,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         node: &CoarseNode,
     ) -> NodeSurface {
         let constants = self.options.constants.measure;
-        let of_mesh = || Original::of(&source_of(&mesh, &stitches), constants);
+        let of_mesh = || SearchableSurface::of(&source_of(&mesh, &stitches), constants);
         let below = Below::source(self.stages.time(Stage::Measure, of_mesh), moved);
         mesh.triangles.append(&mut stitches);
         let spans = match self.options.borders {

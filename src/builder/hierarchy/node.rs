@@ -1,11 +1,11 @@
 //! Finished nodes and where they go.
 
-use super::outline::LeftOut;
+use super::outline::SkippedNode;
 use crate::Result;
 use crate::builder::border::skirt::Skirt;
 use crate::builder::error::SurfaceError;
 use crate::builder::simplify::simplified::LadderStep;
-use crate::mesh::{Kept, Mesh};
+use crate::mesh::{Mesh, OutlineCoverage};
 use crate::texture::BakeReason;
 
 /// A finished node, on its way to disk.
@@ -24,7 +24,7 @@ pub struct NodeDraft<'a> {
     pub budget: usize,
     /// What it would keep of its source's outline within its budget, where that is too little and it
     /// was given more ([`OutlineConstants`](crate::builder::constants::OutlineConstants)).
-    pub within_budget: Option<Kept>,
+    pub within_budget: Option<OutlineCoverage>,
     /// Distance from the original; 0 for leaves, where they are not quantised.
     pub error: SurfaceError,
     /// How it was made.
@@ -60,7 +60,7 @@ pub struct Forest<R> {
     /// In the order in which they were cut off.
     pub trees: Vec<Tree<R>>,
     /// Those above them, and others between them, that were not written; children first.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<SkippedNode>,
 }
 
 /// A node's record and its children.

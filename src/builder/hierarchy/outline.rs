@@ -2,8 +2,8 @@
 //! little.
 
 use crate::builder::constants::OutlineConstants;
-use crate::builder::error::Original;
-use crate::mesh::{Kept, Mesh, Outline, OutlineFrame, UpAxis};
+use crate::builder::error::SearchableSurface;
+use crate::mesh::{Mesh, Outline, OutlineCoverage, OutlineFrame, UpAxis};
 
 /// How many times the triangles the next attempt has, at least: fewer change too little to be worth
 /// one.
@@ -15,13 +15,13 @@ const MOST_MORE: f64 = 2.0;
 /// A coarse node that is not written, since it would keep too little of the outline of its source:
 /// the nodes below it stand in its place.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LeftOut {
+pub struct SkippedNode {
     /// Child numbers from the root of its block down.
     pub child_path: Vec<u32>,
     /// The triangles that it would have had.
     pub triangles: u64,
     /// What it would have kept with these.
-    pub kept: Kept,
+    pub kept: OutlineCoverage,
 }
 
 /// How many times the triangles a node needs that keeps too small a share of the outline, by a law
@@ -40,7 +40,11 @@ pub(super) struct SourceOutline {
 
 impl SourceOutline {
     /// `None` where there is none, or nobody asks for it.
-    pub fn of(original: &Original, up: UpAxis, constants: &OutlineConstants) -> Option<Self> {
+    pub fn of(
+        original: &SearchableSurface,
+        up: UpAxis,
+        constants: &OutlineConstants,
+    ) -> Option<Self> {
         if constants.least_kept <= 0.0 {
             return None;
         }
@@ -52,7 +56,7 @@ impl SourceOutline {
     }
 
     /// What a simplified mesh keeps of it.
-    pub fn kept_by(&self, mesh: &Mesh) -> Kept {
+    pub fn kept_by(&self, mesh: &Mesh) -> OutlineCoverage {
         let outline = self.frame.empty();
         mesh.triangles.iter().for_each(|&t| self.frame.add(&outline, mesh.corners(t)));
         self.outline.kept_by(&outline)

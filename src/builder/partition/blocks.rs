@@ -1,4 +1,4 @@
-//! Where cells are divided no further.
+//! Limits of a block: cells are not divided further below them.
 
 /// A block has about so much at most, where no grid says what blocks are.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,7 +9,7 @@ pub struct Most {
     pub texels: f64,
 }
 
-/// How inputs become blocks.
+/// The method that divides inputs into blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum BlockSplit {
     /// Cells are divided until none has too many triangles.

@@ -45,12 +45,12 @@ impl CellBox {
         Self { low: self.low.map(|at| at - by), high: self.high.map(|at| at + by) }
     }
 
-    /// Whether all of `other` is within, and touches no side.
+    /// Returns whether `other` lies strictly inside.
     pub fn holds_within(&self, other: &Self) -> bool {
         (0..3).all(|axis| self.low[axis] < other.low[axis] && other.high[axis] < self.high[axis])
     }
 
-    /// Whether the boxes have a place in common, if on their sides alone.
+    /// Returns whether the boxes intersect or touch.
     pub fn meets(&self, other: &Self) -> bool {
         (0..3).all(|i| self.low[i] <= other.high[i] && other.low[i] <= self.high[i])
     }

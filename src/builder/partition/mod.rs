@@ -6,13 +6,13 @@
 //! blocks a process builds changes no byte of them.
 
 mod blocks;
-mod bodies;
 mod cell_box;
+mod kept_whole;
 mod scan;
 
 pub use self::blocks::{BlockSplit, Most};
-pub use self::bodies::{Bodies, Others};
 pub use self::cell_box::CellBox;
+pub use self::kept_whole::{KeptWhole, Others};
 pub use self::scan::{Cluster, Scan};
 
 use crate::mesh::UpAxis;
@@ -161,7 +161,7 @@ impl Partition {
             self.cells[number as usize].extent = extent(clusters, triangles, &place);
             return;
         };
-        // Those below first, all in their order.
+        // Stable: clusters below the plane come first.
         clusters.sort_by_key(|cluster| cluster.middle(axis) >= at);
         let below = clusters.partition_point(|cluster| cluster.middle(axis) < at);
         let place = self.cell(number).place;
@@ -183,7 +183,7 @@ impl Partition {
     }
 }
 
-/// How far a block's triangles extend within its cell along the longest side, but for a few huge ones.
+/// Returns the longest side of the box around a block's triangles inside its cell, without a few huge ones.
 fn extent(clusters: &[Cluster], triangles: u64, place: &CellBox) -> f64 {
     let mut by_size: Vec<&Cluster> = clusters.iter().collect();
     by_size.sort_by(|a, b| b.largest.total_cmp(&a.largest));
@@ -198,7 +198,7 @@ fn extent(clusters: &[Cluster], triangles: u64, place: &CellBox) -> f64 {
     around.fold(CellBox::NONE, |all, one| all.and(one)).common(place).longest()
 }
 
-/// How cells are divided.
+/// Parameters of the division of cells.
 struct Dividing {
     split: BlockSplit,
     most: Most,
@@ -255,7 +255,7 @@ impl Dividing {
     }
 }
 
-/// Of the multiples of powers of two from `low` to `high`, the one of the largest power.
+/// Returns the multiple of the largest power of two between `low` and `high`.
 fn coarsest_between(low: f64, high: f64) -> Option<f64> {
     if low.is_nan() || high.is_nan() || low > high || !(high - low).is_finite() {
         return None;

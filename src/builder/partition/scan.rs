@@ -1,4 +1,4 @@
-//! What is known of an input before the partition: how many triangles are where.
+//! Histogram of the triangles of an input, which the partition is computed from.
 
 use rustc_hash::FxHashMap;
 
@@ -8,7 +8,7 @@ use crate::mesh::{Model, Part};
 /// The triangles of one cell of a grid over an input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cluster {
-    /// How many.
+    /// Number of triangles.
     pub triangles: u32,
     /// Texels of the source that they have, where each texture is spread evenly over the triangles that
     /// have it.
@@ -33,7 +33,7 @@ impl Cluster {
 pub struct Scan {
     /// The box around its vertices.
     pub bounds: CellBox,
-    /// Its triangles, in an order of places.
+    /// Clusters of its triangles, sorted by grid cell.
     pub clusters: Vec<Cluster>,
 }
 

@@ -222,11 +222,11 @@ mod tests {
         let step = LadderStep::Collapse;
         let mut result = Simplified { mesh: rest, border: rest_border, error: 0.0, step };
         cap_sections(&mut result, &runs, &path, &mesh, &border);
-        let lids = result.mesh.triangles[before..]
+        let caps = result.mesh.triangles[before..]
             .iter()
             .map(|triangle| triangle.map(|vertex| result.mesh.positions[vertex as usize]))
             .collect();
-        (result, lids)
+        (result, caps)
     }
 
     /// The area of triangles in the plane x = 0, seen along x.
@@ -241,9 +241,9 @@ mod tests {
     #[test]
     fn a_half_that_is_gone_leaves_a_lid_that_faces_this_way() {
         for sign in [1.0, -1.0] {
-            let (result, lids) = closed(sign, |at| at == 13);
-            assert_eq!(lids.len(), 3);
-            assert_eq!(area(&lids), sign * 20.0);
+            let (result, caps) = closed(sign, |at| at == 13);
+            assert_eq!(caps.len(), 3);
+            assert_eq!(area(&caps), sign * 20.0);
             assert_eq!(result.mesh.positions.len(), 3 + 5, "each corner once");
             assert_eq!(result.border.planes, [0, 0, 0, 1, 1, 1, 1, 1]);
         }
@@ -252,13 +252,13 @@ mod tests {
     #[test]
     fn where_some_edges_are_left_the_rest_is_closed() {
         // The floor and a wall stay.
-        let (result, lids) = closed(1.0, |at| at < 4);
-        assert_eq!(area(&lids), 0.5 * 2.0 * 5.0 + 0.5 * 3.0 * 5.0);
+        let (result, caps) = closed(1.0, |at| at < 4);
+        assert_eq!(area(&caps), 0.5 * 2.0 * 5.0 + 0.5 * 3.0 * 5.0);
         assert_eq!(result.mesh.positions.len(), 6 + 2);
-        let (_, lids) = closed(1.0, |at| at < 10);
-        assert!(lids.is_empty(), "no edge of the border is gone");
+        let (_, caps) = closed(1.0, |at| at < 10);
+        assert!(caps.is_empty(), "no edge of the border is gone");
         // One edge alone bounds nothing.
-        let (_, lids) = closed(1.0, |at| at < 8);
-        assert!(lids.is_empty());
+        let (_, caps) = closed(1.0, |at| at < 8);
+        assert!(caps.is_empty());
     }
 }

@@ -45,7 +45,7 @@ struct Places {
     /// Per vertex, the number of its position.
     place: Vec<u32>,
     /// Per position, its grade.
-    grade: Vec<f32>,
+    grid_level: Vec<f32>,
     /// Per vertex, the smallest vertex of its chart.
     chart: Vec<u32>,
 }
@@ -61,9 +61,9 @@ impl Places {
                 *numbers.entry(key(position)).or_insert(next)
             })
             .collect();
-        let grade = grades(mesh, &place, numbers.len());
+        let grid_level = grades(mesh, &place, numbers.len());
         debug_assert_eq!(locked.len(), place.len());
-        Self { place, grade, chart: charts(mesh) }
+        Self { place, grid_level, chart: charts(mesh) }
     }
 
     /// The cell of each vertex.
@@ -171,8 +171,8 @@ fn collapse_cells(
 ) -> (Mesh, Border, f64) {
     // The best vertex of each cell; ties go to the first.
     let better = |a: u32, b: u32| {
-        let grade = |vertex: u32| places.grade[places.place[vertex as usize] as usize];
-        grade(a) > grade(b)
+        let grid_level = |vertex: u32| places.grid_level[places.place[vertex as usize] as usize];
+        grid_level(a) > grid_level(b)
     };
     let cell_count = cells.iter().max().map_or(0, |&most| most as usize + 1);
     let mut best = vec![u32::MAX; cell_count];

@@ -11,7 +11,7 @@ use glam::Vec3;
 use rustc_hash::FxHashMap;
 
 use crate::builder::border::skirt::Skirt;
-use crate::builder::error::{Face, NearestTriangle, Original};
+use crate::builder::error::{Face, NearestTriangle, SearchableSurface};
 use crate::mesh::Mesh;
 
 /// Points of the original that vote, for each coarse triangle, about.
@@ -25,7 +25,7 @@ const ASIDE: f64 = 0.01;
 pub fn with_face_colors(
     mesh: &Mesh,
     skirts: &[Skirt],
-    original: &Original,
+    original: &SearchableSurface,
 ) -> Option<(Mesh, Vec<Skirt>)> {
     let votes = votes(mesh, original)?;
     let mut painted = mesh.clone();
@@ -74,7 +74,7 @@ pub fn with_face_colors(
 }
 
 /// By triangle, the area of the original of each look that is nearest to it and faces its way.
-fn votes(mesh: &Mesh, original: &Original) -> Option<Vec<BTreeMap<Face, f64>>> {
+fn votes(mesh: &Mesh, original: &SearchableSurface) -> Option<Vec<BTreeMap<Face, f64>>> {
     if mesh.colors.is_empty() {
         return None;
     }
@@ -155,8 +155,8 @@ mod tests {
         }
     }
 
-    fn original(mesh: &Mesh) -> Original {
-        Original::of(mesh, MeasureConstants::default())
+    fn original(mesh: &Mesh) -> SearchableSurface {
+        SearchableSurface::of(mesh, MeasureConstants::default())
     }
 
     fn looks(mesh: &Mesh) -> Vec<Option<[u16; 4]>> {

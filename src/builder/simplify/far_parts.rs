@@ -8,7 +8,7 @@
 
 use glam::DVec3;
 
-use super::aggregate::{Bodies, Extruded};
+use super::aggregate::{Components, Extruded};
 use super::compact::with_triangles;
 use super::fallback::fallback_triangles;
 use super::ladder::Method;
@@ -72,7 +72,7 @@ fn stand_in(part: Mesh, border: Border, method: &Method) -> (Mesh, Border) {
     }
     let free = vec![false; part.positions.len()];
     let rules = method.bodies();
-    match Bodies::of(&part, &free, &rules).extruded(&part, TRIANGLES, &rules) {
+    match Components::of(&part, &free, &rules).extruded(&part, TRIANGLES, &rules) {
         Some(Extruded { prisms, rest: [], .. }) => {
             let border = Border::interior(prisms.positions.len());
             (prisms, border)

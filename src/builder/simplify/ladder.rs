@@ -23,7 +23,7 @@ use std::cmp::Ordering;
 use crate::builder::border::vertex::{Border, BorderVertexState, Path};
 use crate::builder::constants::Constants;
 use crate::builder::error::MeanDistance;
-use crate::builder::simplify::aggregate::{Bodies, BodyRules, Extruded, without_floors};
+use crate::builder::simplify::aggregate::{ComponentRules, Components, Extruded, without_floors};
 use crate::builder::simplify::cluster::cluster;
 pub use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::builder::simplify::collapse::collapse;
@@ -61,7 +61,7 @@ pub struct Method<'a> {
     pub up: UpAxis,
     /// For each material, whether its faces may be flipped ([`crate::builder::simplify::orient`]).
     pub reorientable: &'a [bool],
-    /// See [`BodyRules`].
+    /// See [`ComponentRules`].
     pub extrudable: &'a [bool],
     /// A step that is not tried, to measure its effect.
     pub without: Option<LadderStep>,
@@ -71,9 +71,9 @@ pub struct Method<'a> {
 
 impl Method<'_> {
     /// The rules by which a component counts as a building.
-    pub fn bodies(&self) -> BodyRules<'_> {
+    pub fn bodies(&self) -> ComponentRules<'_> {
         let &Self { up, extrudable, constants, .. } = self;
-        BodyRules { up, extrudable, constants: &constants.prisms }
+        ComponentRules { up, extrudable, constants: &constants.prisms }
     }
 }
 
@@ -83,10 +83,10 @@ pub struct Ladder<'a> {
     source: Simplified,
     locked: Vec<bool>,
     method: Method<'a>,
-    bodies: OnceCell<Bodies>,
+    bodies: OnceCell<Components>,
     has_duplicate_faces: OnceCell<bool>,
     is_one_sheet: OnceCell<bool>,
-    /// Its faces wind one way; `None` where they did before.
+    /// The mesh with a consistent winding; `None` if it had one before.
     oriented: OnceCell<Option<Mesh>>,
     distance: OnceCell<MeanDistance>,
     /// This measures from what is seen of the source: floors are left out, since prisms have none.
@@ -94,7 +94,7 @@ pub struct Ladder<'a> {
 }
 
 impl<'a> Ladder<'a> {
-    /// Of a mesh whose border is thinned already ([`crate::builder::border::thin`]), as a node of `path` at
+    /// Prepares a mesh whose border is thinned ([`crate::builder::border::thin`]) for a node of `path` at
     /// `level`.
     pub fn new(mesh: &Mesh, border: &Border, path: &Path, level: u8, method: Method<'a>) -> Self {
         let (mesh, border) = compact(mesh, border);
@@ -215,7 +215,7 @@ impl<'a> Ladder<'a> {
             return None;
         }
         let rules = method.bodies();
-        let bodies = self.bodies.get_or_init(|| Bodies::of(&source.mesh, locked, &rules));
+        let bodies = self.bodies.get_or_init(|| Components::of(&source.mesh, locked, &rules));
         let Extruded { prisms, rest, triangles_per_body } =
             bodies.extruded(&source.mesh, target, &rules)?;
         let step = LadderStep::Prisms;

@@ -18,4 +18,4 @@ pub mod simplified;
 pub mod split_mixed;
 pub mod weld_seams;
 
-pub use self::aggregate::{BodyRules, Extrudable};
+pub use self::aggregate::{ComponentRules, Extrudable};

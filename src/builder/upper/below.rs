@@ -1,4 +1,4 @@
-//! What a node above blocks is measured against: files of nodes below it.
+//! Reads the surfaces that an upper node is measured against from the files of nodes below it.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -6,20 +6,20 @@ use std::sync::Arc;
 use crate::builder::constants::MeasureConstants;
 use crate::builder::emit::disk_sink::NodeRecord;
 use crate::builder::error::{
-    Below, BoundedNode, Original, Surface, SurfaceError, measured_against,
+    Below, BoundedNode, SearchableSurface, Surface, SurfaceError, measured_against,
 };
 use crate::builder::hierarchy::Tree;
 use crate::format::{NODES_DIR, NodeMesh, read_glb_without_normals};
 use crate::mesh::{Mesh, all_differ};
 use crate::{Error, Result};
 
-/// Where files are, and what coordinates they are brought to.
+/// Reads node files into common coordinates.
 pub struct Files<'a> {
     /// The output folder.
     pub out: &'a Path,
-    /// In source coordinates.
+    /// Origin of the common coordinates, in source coordinates.
     pub origin: [f64; 3],
-    /// How distances are measured.
+    /// Constants of measuring.
     pub constants: MeasureConstants,
 }
 
@@ -38,33 +38,33 @@ impl BoundedNode for Tree<NodeRecord> {
 }
 
 impl Files<'_> {
-    /// What is below the node above these members.
+    /// Returns the surfaces below the parent of these members.
     pub fn below(&self, members: &[Tree<NodeRecord>]) -> Result<Below> {
         let mut surfaces = Vec::new();
         let (mut area, mut mean, mut p95) = (0.0, 0.0, 0.0);
         for Tree { record, .. } in measured_against(members) {
             let surface = self.read(record)?;
-            // Of distances sampled by area, the weighted mean.
+            // Distances are sampled by area, so means are weighted by area.
             let of_node = surface.area();
             area += of_node;
             mean += record.mean_error * of_node;
             p95 += record.p95_error * of_node;
-            surfaces.push(Arc::new(surface.with_off(record.geometric_error)));
+            surfaces.push(Arc::new(surface.with_surface_offset(record.geometric_error)));
         }
         let [mean, p95] = [mean, p95].map(|sum| if area > 0.0 { sum / area } else { 0.0 });
         let off = SurfaceError { bound: 0.0, mean, rms: mean, p95 };
-        let source = Arc::new(Original::union(&surfaces));
+        let source = Arc::new(SearchableSurface::union(&surfaces));
         let bound = members.iter().map(BoundedNode::bound).fold(0.0, f64::max);
         let nodes = vec![Surface::new(Arc::clone(&source), bound)];
         Ok(Below { source, off, nodes })
     }
 
-    fn read(&self, record: &NodeRecord) -> Result<Original> {
+    fn read(&self, record: &NodeRecord) -> Result<SearchableSurface> {
         let path = self.out.join(NODES_DIR).join(&record.file);
         let bytes = crate::format::read_regular(&path)
             .map_err(|error| Error::output(&path, format!("cannot be read again: {error}")))?;
         let mesh = surface(&read_glb_without_normals(&bytes, &path)?, self.origin);
-        Ok(Original::of(&mesh, self.constants))
+        Ok(SearchableSurface::of(&mesh, self.constants))
     }
 }
 

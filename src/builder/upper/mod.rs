@@ -17,7 +17,7 @@ use rustc_hash::FxHashSet;
 use self::below::Files;
 use crate::Error;
 use crate::Result;
-use crate::builder::block_setup::{BlockPlace, BlockSetup, Looks, Target};
+use crate::builder::block_setup::{Appearances, BlockPlace, BlockSetup, Target};
 use crate::builder::border::chain::KeepRule;
 use crate::builder::built::border_file;
 use crate::builder::cut::mark::{Marks, mark_border};
@@ -29,7 +29,7 @@ use crate::builder::gather::{gather, localise};
 use crate::builder::hierarchy::{BorderMode, MemberSurfaces, Resolutions, Tree};
 use crate::builder::options::BuildOptions;
 use crate::builder::partition::{CellBox, Partition, Split};
-use crate::builder::reuse::Earlier;
+use crate::builder::reuse::PreviousBuild;
 use crate::builder::stages::Stage;
 use crate::builder::stitch::{OpenEdge, stitches};
 use crate::format::{SharedTexture, read_regular};
@@ -47,27 +47,27 @@ const MOST_MEMBERS: usize = 4;
 pub struct Uppers {
     /// The trees.
     pub trees: Vec<Tree<NodeRecord>>,
-    /// How each node was made, in order of files.
+    /// Content hashes of the nodes, in order of files.
     pub reports: Vec<UpperReport>,
-    /// What was imperfect.
+    /// Warnings of all upper nodes.
     pub warnings: Warnings,
 }
 
 /// The trees of a block, and the name of its files.
 #[derive(Debug, Default)]
 pub struct BlockTrees {
-    /// Its files are called so.
+    /// Prefixes of its files.
     pub names: Vec<String>,
-    /// Its trees.
+    /// Node trees.
     pub trees: Vec<Tree<NodeRecord>>,
 }
 
 /// This builds nodes above blocks.
 pub struct UpperBuilder<'a> {
-    /// How, and where to; the folder has the files of what is below.
+    /// Options and output. The output folder has the files of the nodes below.
     pub target: Target<'a>,
     /// A result whose nodes are taken over where they are made of the same.
-    pub earlier: Option<&'a Earlier>,
+    pub earlier: Option<&'a PreviousBuild>,
     /// Which axis points at the sky.
     pub up: UpAxis,
     /// The cells.
@@ -144,7 +144,7 @@ impl UpperBuilder<'_> {
         Ok(Built { trees, border })
     }
 
-    /// Whether trees have together what the children of a node have.
+    /// Returns whether trees have together as many triangles as the children of a node.
     fn is_enough(&self, trees: &[Tree<NodeRecord>]) -> bool {
         let BuildOptions { hierarchy, .. } = self.target.options;
         let (budget, factor) =
@@ -164,10 +164,10 @@ impl UpperBuilder<'_> {
     ) -> Result<Vec<Tree<NodeRecord>>> {
         let lattice = self.lattice_of(&members);
         let file = file_of(&members);
-        let made_of = made_of(&members, border, lattice);
-        let report = UpperReport { file, made_of };
+        let content_hash = content_hash(&members, border, lattice);
+        let report = UpperReport { file, content_hash };
         if let Some(earlier) = self.earlier
-            && let Some((record, reused)) = earlier.take_over_upper(&report, self.target.out)?
+            && let Some((record, reused)) = earlier.reuse_upper(&report, self.target.out)?
         {
             earlier.link_textures(reused.keys(), self.target.out)?;
             let mut textures = gathered.textures.lock().unwrap_or_else(PoisonError::into_inner);
@@ -219,7 +219,7 @@ impl UpperBuilder<'_> {
         let mut model =
             stages.time(Stage::Gather, || members::read(out.path(), records(), lattice))?;
         merge_untextured(&mut model);
-        let looks = Looks::new(&model);
+        let looks = Appearances::new(&model);
         let kinds = looks.kinds(&model.parts);
         let goes_on = |edge: &OpenEdge| {
             let in_plane = |axis: usize, at: f64| edge.ends.iter().all(|end| end[axis] == at);
@@ -237,7 +237,7 @@ impl UpperBuilder<'_> {
             Marks { planes: planes.iter().collect(), touching: FxHashSet::default(), coarser: 0 };
         stages.time(Stage::Gather, || mark_border(&mut chunk, &marks));
         stages.time(Stage::Gather, || members::read_pictures(out.path(), records(), &mut model))?;
-        let Looks { textures, extrudable, .. } = looks;
+        let Appearances { textures, extrudable, .. } = looks;
         let images = DecodedImages::default();
         let announced = images.announce(&model, &textures, chunk.mesh.materials.iter().copied());
         let cache = TextureCache::new(&model, &textures, &announced);
@@ -249,7 +249,7 @@ impl UpperBuilder<'_> {
         let (chunk, _) = stages.time(Stage::Gather, || localise(chunk, origin, lattice, false));
         let triangles = chunk.mesh.triangles.len();
         let budget = (triangles as f64 / f64::from(hierarchy.level_factor)).round();
-        // As much as a root may have at most.
+        // A node has at most the budget of a root.
         let budget = (budget as usize).clamp(1, hierarchy.desired_tris as usize);
         let resolutions = Resolutions::above(triangles, budget, hierarchy);
         let place = BlockPlace { prefix: prefix_of(members), origin, lattice };
@@ -262,14 +262,15 @@ impl UpperBuilder<'_> {
         Ok((made.ok(), cache.warnings()))
     }
 
-    /// That of the blocks, or a coarser one where a node is larger.
+    /// Returns the lattice of the blocks, or a coarser one for large nodes.
     fn lattice_of(&self, members: &[Tree<NodeRecord>]) -> Lattice {
         let bounds = members.iter().map(|tree| &tree.record.attributes);
         let corners = bounds.flat_map(|node| [node.bbox_min, node.bbox_max]);
         CellBox::around(corners).lattice().coarser(self.lattice)
     }
 
-    /// As at planes within blocks: triangles go to a share and the length of borders to its root.
+    /// Returns the rule that ranks border vertices, as at planes within blocks: triangles fall to a share, and
+    /// border vertices to its square root.
     fn keep_rule(&self, lattice: Lattice) -> KeepRule<'static> {
         let hierarchy = &self.target.options.hierarchy;
         let (share, collinear) = match hierarchy.borders {
@@ -291,7 +292,7 @@ fn file_of(members: &[Tree<NodeRecord>]) -> String {
     format!("{}.glb", prefix_of(members))
 }
 
-/// What the file of a node is called: by what it stands for.
+/// Returns the prefix of a node's file, a hash of its members' file names.
 fn prefix_of(members: &[Tree<NodeRecord>]) -> String {
     let mut hasher = blake3::Hasher::new();
     for Tree { record, .. } in members {
@@ -302,9 +303,9 @@ fn prefix_of(members: &[Tree<NodeRecord>]) -> String {
 }
 
 /// A hash of all that a node is made of.
-fn made_of(members: &[Tree<NodeRecord>], border: &RecordedBorder, lattice: Lattice) -> String {
+fn content_hash(members: &[Tree<NodeRecord>], border: &RecordedBorder, lattice: Lattice) -> String {
     let mut hasher = blake3::Hasher::new();
-    // Its error is measured through all that is below.
+    // The error depends on all nodes below.
     for tree in members {
         tree.for_each(&mut |record: &NodeRecord| {
             hasher.update(record.file.as_bytes());

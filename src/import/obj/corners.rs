@@ -6,8 +6,8 @@ use std::ops::Range;
 use rustc_hash::FxHashMap;
 
 use super::super::clean::CleanStats;
-use super::super::paged::Paged;
-use super::super::vertices::{NONE, Pair, Unifier};
+use super::super::paged::PagedVec;
+use super::super::vertices::{NONE, Pair, VertexDeduplicator};
 use super::statements::Statements;
 use crate::mesh::Triangulator;
 
@@ -42,7 +42,7 @@ impl Triangles {
         statements: &Statements,
         runs: &[Run],
         before: [usize; 3],
-        positions: &Paged<[f64; 3]>,
+        positions: &PagedVec<[f64; 3]>,
     ) -> Self {
         let mut result =
             Self { indices: Vec::with_capacity(statements.corners.len()), ..Self::default() };
@@ -58,7 +58,7 @@ impl Triangles {
         let has_normals =
             runs.iter().any(|run| run.lit) && corners.iter().any(|[_, _, normal]| *normal != NONE);
         let places = Places::of(&corners);
-        let mut unifier = Unifier::default();
+        let mut unifier = VertexDeduplicator::default();
         unifier.grow(places.count());
         let mut triangulator = Triangulator::default();
         let mut outline = Vec::new();

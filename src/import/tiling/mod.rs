@@ -21,7 +21,7 @@ use std::sync::Arc;
 
 use self::bodies::Bodies;
 use self::division::{Counts, Division};
-use self::spilled::Spilled;
+use self::spilled::DiskVec;
 use self::tile_text::{Belongs, FaceCorner, NONE, Names, TileReader, TileText};
 use super::clean::CleanStats;
 use super::find::{Kind, kind};
@@ -241,14 +241,14 @@ struct Tiler<'a> {
     tiles: Vec<TileText>,
     /// Corners that wait in a tile until they are written.
     pending: usize,
-    positions: Spilled<[f64; 3]>,
+    positions: DiskVec<[f64; 3]>,
     /// How many of them stand before what is being added.
     placed: usize,
     bodies: Bodies,
-    texcoords: Spilled<[f64; 2]>,
-    normals: Spilled<Normal>,
+    texcoords: DiskVec<[f64; 2]>,
+    normals: DiskVec<Normal>,
     /// One per position where a vertex has a colour; linear light.
-    colors: Spilled<[u16; 4]>,
+    colors: DiskVec<[u16; 4]>,
     color_range: ColorRange,
     /// Names that faces belong to.
     sample: NameSample,
@@ -272,12 +272,12 @@ impl<'a> Tiler<'a> {
             end: 0,
             tiles: Vec::new(),
             pending: PENDING,
-            positions: Spilled::new(dir)?,
+            positions: DiskVec::new(dir)?,
             placed: 0,
             bodies: Bodies::default(),
-            texcoords: Spilled::new(dir)?,
-            normals: Spilled::new(dir)?,
-            colors: Spilled::new(dir)?,
+            texcoords: DiskVec::new(dir)?,
+            normals: DiskVec::new(dir)?,
+            colors: DiskVec::new(dir)?,
             color_range: ColorRange::default(),
             sample: NameSample::default(),
             traits: FileTraits::default(),

@@ -14,7 +14,7 @@ const PAGE: usize = 1 << 12;
 const HELD: usize = 64;
 
 /// A list of which a few pages are in memory, the others in a file that goes with it.
-pub(super) struct Spilled<T> {
+pub(super) struct DiskVec<T> {
     file: File,
     /// What was added behind the last page that is written.
     tail: Vec<T>,
@@ -24,7 +24,7 @@ pub(super) struct Spilled<T> {
     elements: PhantomData<T>,
 }
 
-impl<T: Pod> Spilled<T> {
+impl<T: Pod> DiskVec<T> {
     /// An empty list, whose file is in `dir` and has no name there, so that it is gone however the program
     /// ends.
     pub fn new(dir: &Path) -> io::Result<Self> {
@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn what_was_added_is_found_wherever_it_is() {
         let folder = tempfile::tempdir().unwrap();
-        let mut list = Spilled::new(folder.path()).unwrap();
+        let mut list = DiskVec::new(folder.path()).unwrap();
         assert_eq!(list.get(0).unwrap(), None);
         let count = (HELD + 3) * PAGE + 17;
         list.extend((0..count as u64).map(|at| [at, !at])).unwrap();

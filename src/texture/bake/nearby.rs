@@ -1,6 +1,6 @@
 //! What of the original lies nearest to the vertices of a node.
 
-use super::source::Source;
+use super::source::BakeSource;
 use crate::mesh::{Mesh, wide};
 
 /// For each vertex of a node's mesh, what of the original is nearest to it.
@@ -21,7 +21,7 @@ struct Near {
 
 impl Nearby {
     /// Of the vertices of these triangles; each is seen from the first that has it.
-    pub fn of(source: &Source, mesh: &Mesh, members: &[u32]) -> Self {
+    pub fn of(source: &BakeSource, mesh: &Mesh, members: &[u32]) -> Self {
         let mut vertices = vec![None; mesh.positions.len()];
         let mut before = None;
         for &member in members {

@@ -9,7 +9,7 @@ use super::flat::{FlatChart, for_centres};
 use super::nearby::Nearby;
 use super::project::Projection;
 use super::shading::{Samples, tint};
-use super::source::{Source, SurfacePoint};
+use super::source::{BakeSource, SurfacePoint};
 use super::tile::Tile;
 use crate::color;
 use crate::mesh::Mesh;
@@ -135,7 +135,7 @@ impl BlockTextures<'_> {
     /// Draws a chart with `scale` texels a metre.
     pub(super) fn paint(
         &self,
-        source: &Source,
+        source: &BakeSource,
         mesh: &Mesh,
         chart: &FlatChart,
         scale: f64,
@@ -216,7 +216,7 @@ impl BlockTextures<'_> {
     }
 
     /// What the original shows at a point, at the level's resolution, linear light, 0–1.
-    fn color_at(&self, source: &Source, point: SurfacePoint, level: usize) -> Vec3 {
+    fn color_at(&self, source: &BakeSource, point: SurfacePoint, level: usize) -> Vec3 {
         let triangle = source.triangle(point.triangle);
         let Some(levels) = self.levels_of(triangle) else { return Vec3::ONE };
         let image = &levels[level];

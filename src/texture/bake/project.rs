@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3, Vec3A};
 
 use super::chart_plane::ChartPlane;
 use super::facet::Facet;
-use super::source::Source;
+use super::source::BakeSource;
 use super::tile::{Member, Tile};
 
 /// Triangles of the original whose normal has a smaller cosine with the chart's are seen from their
@@ -23,7 +23,7 @@ const SLACK: f64 = 1e-6;
 /// What a sample shows: a triangle of the original, and where in its image sample (x, y) of the
 /// chart lies: `at + x * along[0] + y * along[1]`, source texels.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shown {
+pub(super) struct SampleHit {
     pub triangle: u32,
     /// By how much the position moves from one sample to the next, source texels, along rows or
     /// columns, whichever is more.
@@ -34,7 +34,7 @@ pub(super) struct Shown {
     weights: [[f64; 3]; 2],
 }
 
-impl Shown {
+impl SampleHit {
     /// The position in the image that the origin of the chart shows, and by how much it moves with
     /// each column and row; times `scale`.
     pub fn texels(&self, scale: f64) -> [DVec2; 3] {
@@ -55,7 +55,7 @@ pub(super) struct Projection {
     nearest: Vec<f32>,
     /// By sample of the tile: the number in `shown` of what it shows, or one beyond all.
     pub numbers: Vec<u32>,
-    pub shown: Vec<Shown>,
+    pub shown: Vec<SampleHit>,
     found: Vec<u32>,
     candidates: Vec<Candidate>,
 }
@@ -76,7 +76,7 @@ impl Projection {
     /// Draws what of `source` lies within reach of a tile's triangles.
     pub fn draw(
         &mut self,
-        source: &Source,
+        source: &BakeSource,
         plane: &ChartPlane,
         tile: &Tile,
         facets: &[Option<Facet>],
@@ -104,7 +104,7 @@ impl Projection {
     }
 
     /// Finds the triangles of the original that may meet a box in samples and metres over the chart.
-    fn gather(&mut self, source: &Source, plane: &ChartPlane, [low, high]: [Vec3A; 2]) {
+    fn gather(&mut self, source: &BakeSource, plane: &ChartPlane, [low, high]: [Vec3A; 2]) {
         self.found.clear();
         let [from, to] = plane.box_around(low.as_dvec3(), high.as_dvec3());
         source.in_box(from, to, |triangle| self.found.push(triangle));
@@ -124,7 +124,7 @@ impl Projection {
     /// Draws a candidate onto the samples of one triangle of the chart.
     fn draw_one(
         &mut self,
-        source: &Source,
+        source: &BakeSource,
         candidate: usize,
         facet: &Facet,
         member: &Member,
@@ -168,7 +168,7 @@ impl Projection {
             })
         };
         let above = combine(p, q, r);
-        let weight = Source::weight(cosine) as f32;
+        let weight = BakeSource::weight(cosine) as f32;
         let (reach, slope) = (facet.reach as f32, above[1] as f32);
         let edges = Edges::new([a, b, c]);
         let range = [columns.start as f64, columns.end as f64 - 1.0];
@@ -209,7 +209,7 @@ impl Projection {
                 let along = [DVec2::new(u[1], v[1]), DVec2::new(u[2], v[2])];
                 let spacing = along[0].length_squared().max(along[1].length_squared()).sqrt();
                 let at = DVec2::new(u[0], v[0]);
-                self.shown.push(Shown { triangle: number, spacing, at, along, weights });
+                self.shown.push(SampleHit { triangle: number, spacing, at, along, weights });
             }
         }
     }
@@ -275,7 +275,7 @@ mod tests {
 
     /// Triangles anywhere within a metre above or below the square from 0 to 4, each the whole of
     /// an image of 100 texels a side.
-    fn soup(random: &mut Random) -> Source {
+    fn soup(random: &mut Random) -> BakeSource {
         let mut mesh = Mesh::default();
         for first in (0..TRIANGLES).map(|triangle| 3 * triangle) {
             let mut place = |low: f64, high: f64| random.between(low, high) as f32;
@@ -288,7 +288,7 @@ mod tests {
             mesh.triangles.push([first, first + 1, first + 2]);
         }
         let classes = BakeClasses::new(&[Material::plain("any")], |_| true);
-        Source::new(&mesh, &classes, |_| Some((0, 0, [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]])))
+        BakeSource::new(&mesh, &classes, |_| Some((0, 0, [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]])))
     }
 
     /// Weights of the corners where the line through a point along a normal meets a triangle's
@@ -362,7 +362,7 @@ mod tests {
                         .filter_map(|number| {
                             let (weights, away) = met(point, facet.normal, source.corners(number))?;
                             let cosine = source.triangle(number).normal.dot(facet.normal);
-                            Some((away * Source::weight(cosine), away, weights, number))
+                            Some((away * BakeSource::weight(cosine), away, weights, number))
                         })
                         .filter(|&(_, away, ..)| away <= REACH)
                         .min_by(|a, b| a.0.total_cmp(&b.0));

@@ -2,8 +2,8 @@
 
 use glam::{DVec2, Vec4};
 
-use super::project::{Projection, Shown};
-use super::source::{Source, SourceTriangle};
+use super::project::{Projection, SampleHit};
+use super::source::{BakeSource, SourceTriangle};
 use super::tile::Tile;
 use crate::texture::block::{BlockTextures, Prepared};
 use crate::texture::level::{LevelImage, Sampler};
@@ -44,7 +44,7 @@ struct Shading<'a> {
     texels: [DVec2; 3],
     /// Samples far enough inside its chart are means of two by two texels.
     wide: bool,
-    shown: &'a Shown,
+    shown: &'a SampleHit,
     colors: Option<[[u16; 4]; 3]>,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Samples<'a> {
     /// of one chart.
     pub fn new(
         block: &'a BlockTextures,
-        source: &Source,
+        source: &BakeSource,
         tile: &'a Tile,
         projection: &'a Projection,
         wide: bool,
@@ -113,7 +113,12 @@ impl<'a> Samples<'a> {
 }
 
 impl<'a> Shading<'a> {
-    fn new(block: &'a BlockTextures, source: &Source, shown: &'a Shown, wide: bool) -> Self {
+    fn new(
+        block: &'a BlockTextures,
+        source: &BakeSource,
+        shown: &'a SampleHit,
+        wide: bool,
+    ) -> Self {
         let triangle = source.triangle(shown.triangle);
         let narrow = |level: &&LevelImage| level.step <= shown.spacing * NARROWER;
         let levels = block.levels_of(triangle);

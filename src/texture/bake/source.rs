@@ -18,7 +18,7 @@ const ALONG: f64 = 0.5;
 
 /// Textured triangles of a block at full detail, with their texels.
 #[derive(Debug)]
-pub(crate) struct Source {
+pub(crate) struct BakeSource {
     surface: Surface,
     triangles: Vec<SourceTriangle>,
 }
@@ -77,7 +77,7 @@ fn limit_density(triangles: &mut [SourceTriangle]) {
     }
 }
 
-impl Source {
+impl BakeSource {
     /// The triangles of `mesh` whose material is of some class. `texels` gives the texture of a
     /// triangle, its chart, and where its corners lie in the image.
     pub fn new(

@@ -21,7 +21,7 @@ fn at_2<'a>(rule: &'a KeepRule<'a>) -> Cut<'a, f32> {
         coordinate: 2.0,
         lattice: Some(Lattice { step: 1.0 }),
         tolerance: CutTolerance { sliver_share: 0.0, sliver_steps: 0.0 },
-        whole: UncutComponents::default(),
+        whole: WholeComponents::default(),
         rule,
     }
 }

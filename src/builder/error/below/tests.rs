@@ -22,7 +22,7 @@ fn strip(from: usize, to: usize, step: usize) -> Mesh {
     mesh(&positions, &squares.collect::<Vec<_>>())
 }
 
-/// Below the parent of a node with every `step`th vertex that has two children, down to the source.
+/// Makes what the parent of two nodes is measured against. They keep every `step`th vertex of the source.
 fn made(from: usize, to: usize, step: usize) -> Below {
     if step == 1 {
         return Below::source(surface_of(&strip(from, to, 1)), 0.0);
@@ -80,7 +80,7 @@ fn nodes_are_measured_two_levels_below_and_further_where_bounds_are_large() {
     assert_eq!(numbers(&tree([5.0, 4.0])), [0, 3, 5, 4]);
 }
 
-/// How far the surfaces below are off counts where they are, and not elsewhere.
+/// The offset of a surface counts at that surface only.
 #[test]
 fn offs_count_where_they_are() {
     let [near, far] = [(0, 64), (64, 128)].map(|(from, to)| strip(from, to, 1));
@@ -90,7 +90,10 @@ fn offs_count_where_they_are() {
         surface_of(&all)
     };
     let surface = |off: [f64; 2]| {
-        let parts = [surface_of(&near).with_off(off[0]), surface_of(&far).with_off(off[1])];
+        let parts = [
+            surface_of(&near).with_surface_offset(off[0]),
+            surface_of(&far).with_surface_offset(off[1]),
+        ];
         let nodes = parts.into_iter().map(|part| Surface::new(Arc::new(part), 0.0)).collect();
         Below { nodes, ..Below::source(surface_of(&strip(0, 128, 1)), 0.0) }
     };

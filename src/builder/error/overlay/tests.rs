@@ -22,7 +22,7 @@ fn sheet() -> Mesh {
 }
 
 /// What can be proven of a large triangle over the sheet, from each triangle of it on.
-fn bounds(original: &Original) -> Vec<Option<f32>> {
+fn bounds(original: &SearchableSurface) -> Vec<Option<f32>> {
     let large = [[1.2, 1.1, 0.0], [9.7, 2.3, 0.0], [4.1, 9.4, 0.0]];
     let large = Triangle::new(large.map(Vec3::from));
     let mut overlay = Overlay::new(original);
@@ -61,7 +61,7 @@ fn walks_lead_from_part_to_part() {
         Arc::new(surface_of(&Mesh { triangles, ..whole.clone() }))
     };
     let count = |bounds: Vec<Option<f32>>| bounds.into_iter().flatten().count();
-    let of_halves = count(bounds(&Original::union(&[half(true), half(false)])));
+    let of_halves = count(bounds(&SearchableSurface::union(&[half(true), half(false)])));
     assert_eq!(of_halves, count(bounds(&surface_of(&whole))));
 }
 
@@ -119,7 +119,7 @@ fn what_failed_walks_settle_counts() {
             assert_eq!(overlay.bound(&large, 0, start, 0.5, 1e-5), None);
         }
     }
-    let marks = overlay.into_marks();
-    assert!(marks.slots.iter().any(|(_, mark)| mark.is_settled()));
-    assert!((0.05..=0.5).contains(&marks.farthest), "{}", marks.farthest);
+    let visit_states = overlay.into_visit_states();
+    assert!(visit_states.slots.iter().any(|(_, mark)| mark.is_settled()));
+    assert!((0.05..=0.5).contains(&visit_states.farthest), "{}", visit_states.farthest);
 }

@@ -4,7 +4,7 @@ use crate::mesh::{Coordinate, Mesh};
 
 /// What a roof or a wall looks like.
 #[derive(Clone, Copy)]
-pub(super) struct Look {
+pub(super) struct Appearance {
     /// A vertex with its material.
     pub(super) vertex: u32,
     /// Linear, 0 to 65535.
@@ -13,13 +13,13 @@ pub(super) struct Look {
 
 /// What triangles look like on average.
 #[derive(Default)]
-pub(super) struct LookSum {
+pub(super) struct AppearanceSum {
     largest: (f64, u32),
     pub(super) area: f64,
     color: [f64; 4],
 }
 
-impl LookSum {
+impl AppearanceSum {
     pub(super) fn add<C: Coordinate>(&mut self, mesh: &Mesh<C>, triangle: [u32; 3], area: f64) {
         if area > self.largest.0 {
             self.largest = (area, triangle[0]);
@@ -34,8 +34,10 @@ impl LookSum {
         }
     }
 
-    pub(super) fn look(&self) -> Option<Look> {
-        (self.area > 0.0)
-            .then(|| Look { vertex: self.largest.1, color: self.color.map(|sum| sum / self.area) })
+    pub(super) fn look(&self) -> Option<Appearance> {
+        (self.area > 0.0).then(|| Appearance {
+            vertex: self.largest.1,
+            color: self.color.map(|sum| sum / self.area),
+        })
     }
 }

@@ -25,7 +25,7 @@ use crate::mesh::{Coordinate, Mesh, UpAxis};
 
 /// What counts as a body.
 #[derive(Clone, Copy, Debug)]
-pub struct BodyRules<'a> {
+pub struct ComponentRules<'a> {
     /// Which axis points at the sky.
     pub up: UpAxis,
     /// Of each material, whether prisms may have it: they have no texture coordinates, so a plain
@@ -35,7 +35,7 @@ pub struct BodyRules<'a> {
     pub constants: &'a PrismConstants,
 }
 
-impl BodyRules<'_> {
+impl ComponentRules<'_> {
     /// A part of a mesh as a body, if it is one.
     fn body<C: Coordinate>(&self, mesh: &Mesh<C>, part: &Part) -> Option<Body> {
         let may = |&triangle: &[u32; 3]| {
@@ -72,7 +72,7 @@ pub struct Extruded<'a> {
 
 /// Whether a mesh has so many separate bodies that prisms may be better than edge collapse for a
 /// node with so many triangles.
-pub fn has_many_bodies(mesh: &Mesh, target: usize, rules: &BodyRules) -> bool {
+pub fn has_many_bodies(mesh: &Mesh, target: usize, rules: &ComponentRules) -> bool {
     rules.count(mesh) * rules.constants.triangles_per_body > target
 }
 
@@ -80,7 +80,7 @@ pub fn has_many_bodies(mesh: &Mesh, target: usize, rules: &BodyRules) -> bool {
 const LEAST_TRIANGLES: usize = 10;
 
 /// The bodies of a mesh, which prisms may stand for.
-pub struct Bodies {
+pub struct Components {
     bodies: Vec<(Part, Body)>,
     /// The triangles that are of no body.
     rest: Vec<[u32; 3]>,
@@ -90,9 +90,9 @@ pub struct Bodies {
     footprints: OnceCell<Option<Footprints>>,
 }
 
-impl Bodies {
+impl Components {
     /// Finds those of a mesh; nothing that has a `locked` vertex is one.
-    pub fn of(mesh: &Mesh, locked: &[bool], rules: &BodyRules) -> Self {
+    pub fn of(mesh: &Mesh, locked: &[bool], rules: &ComponentRules) -> Self {
         let (mut bodies, mut rest) = (Vec::new(), Vec::new());
         let (mut in_bodies, mut area) = (0.0, 0.0);
         let parts = if rules.any() { parts(mesh) } else { Vec::new() };
@@ -113,12 +113,17 @@ impl Bodies {
     /// Replaces all of them by prisms, so that about `target` triangles are left for the whole mesh, by
     /// the same rules, if the rest is simplified too; `None` where there are too few bodies to be worth it,
     /// or these have too many borders for so few triangles. Further budgets use the grid of the first.
-    pub fn extruded(&self, mesh: &Mesh, target: usize, rules: &BodyRules) -> Option<Extruded<'_>> {
+    pub fn extruded(
+        &self,
+        mesh: &Mesh,
+        target: usize,
+        rules: &ComponentRules,
+    ) -> Option<Extruded<'_>> {
         let Self { bodies, rest, share, footprints } = self;
         if bodies.len() * rules.constants.triangles_per_body <= target {
             return None;
         }
-        // What the rest does not need is there for bodies.
+        // Prisms get the triangles that the rest does not need.
         let for_bodies = (target as f64 * share).max(target as f64 - rest.len() as f64);
         let triangles_per_body = for_bodies / bodies.len() as f64;
         let most = (for_bodies as usize).max(LEAST_TRIANGLES);
@@ -159,8 +164,8 @@ mod tests {
         mesh
     }
 
-    fn rules(constants: &PrismConstants) -> BodyRules<'_> {
-        BodyRules { up: UpAxis::Z, extrudable: &[true], constants }
+    fn rules(constants: &PrismConstants) -> ComponentRules<'_> {
+        ComponentRules { up: UpAxis::Z, extrudable: &[true], constants }
     }
 
     #[test]
@@ -168,11 +173,11 @@ mod tests {
         let mesh = town();
         let mut constants = PrismConstants { cells: 1 << 18, ..PrismConstants::default() };
         let free = vec![false; mesh.positions.len()];
-        // With 6 triangles for each house rows are joined over gaps of 6 m, which are filled; with 13 each
+        // With 6 triangles a house, rows are joined across gaps of 6 m, which are filled. With 13, each house
         // has its own box.
         for (target, most) in [(600, 1.5), (1300, 1.03)] {
             let rules = rules(&constants);
-            let bodies = Bodies::of(&mesh, &free, &rules);
+            let bodies = Components::of(&mesh, &free, &rules);
             let Extruded { prisms, rest, .. } = bodies.extruded(&mesh, target, &rules).unwrap();
             assert_eq!(rest.len(), 1, "the ground");
             let count = prisms.triangles.len();
@@ -203,20 +208,20 @@ mod tests {
         let mut textured = mesh.clone();
         textured.texcoords = vec![[0.5; 2]; mesh.positions.len()];
         let all = rules(&constants);
-        let textured_bodies = Bodies::of(&textured, &free, &all);
+        let textured_bodies = Components::of(&textured, &free, &all);
         let baked = textured_bodies.extruded(&textured, 600, &all).unwrap().prisms;
         assert_eq!(baked.texcoords.len(), baked.positions.len());
-        let kept = BodyRules { extrudable: &[false], ..all };
-        assert!(Bodies::of(&textured, &free, &kept).extruded(&textured, 600, &kept).is_none());
+        let kept = ComponentRules { extrudable: &[false], ..all };
+        assert!(Components::of(&textured, &free, &kept).extruded(&textured, 600, &kept).is_none());
         assert_eq!((all.count(&textured), kept.count(&textured)), (100, 0));
         let mut locked = free.clone();
         locked[0] = true;
-        let kept = Bodies::of(&mesh, &locked, &all);
+        let kept = Components::of(&mesh, &locked, &all);
         assert_eq!(kept.extruded(&mesh, 600, &all).unwrap().rest.len(), 1 + 14);
-        let free_bodies = Bodies::of(&mesh, &free, &all);
+        let free_bodies = Components::of(&mesh, &free, &all);
         assert!(free_bodies.extruded(&mesh, 2000, &all).is_none(), "enough for all");
         constants.cells = 0;
         let none = rules(&constants);
-        assert!(Bodies::of(&mesh, &free, &none).extruded(&mesh, 600, &none).is_none());
+        assert!(Components::of(&mesh, &free, &none).extruded(&mesh, 600, &none).is_none());
     }
 }

@@ -3,15 +3,15 @@
 use glam::{DVec2, DVec3};
 
 use crate::builder::constants::PrismConstants;
-use crate::builder::simplify::aggregate::look::{Look, LookSum};
+use crate::builder::simplify::aggregate::look::{Appearance, AppearanceSum};
 use crate::mesh::{Coordinate, Mesh, UpAxis, wide};
 
 /// A separate body with walls and roofs, whichever way its faces wind.
 pub(in super::super) struct Body {
     /// What it covers of the ground, about, square metres.
     pub footprint: f64,
-    pub roof: Look,
-    pub wall: Look,
+    pub roof: Appearance,
+    pub wall: Appearance,
 }
 
 impl Body {
@@ -29,7 +29,7 @@ impl Body {
         }
         let middle = (low.z + high.z) * 0.5;
         let (mut upper, mut lower) = (0.0, 0.0);
-        let (mut roof, mut wall) = (LookSum::default(), LookSum::default());
+        let (mut roof, mut wall) = (AppearanceSum::default(), AppearanceSum::default());
         let mut upper_heights = 0.0;
         for &triangle in triangles {
             let [a, b, c] = triangle.map(at);

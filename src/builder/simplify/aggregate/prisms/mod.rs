@@ -23,8 +23,8 @@ pub(super) use self::body::Body;
 use self::heights::{Grid, Heights, NONE};
 use self::outlines::Outlines;
 use self::regions::{Labels, Regions};
-use super::BodyRules;
-use super::look::Look;
+use super::ComponentRules;
+use super::look::Appearance;
 use crate::builder::constants::PrismConstants;
 use crate::builder::simplify::parts::Part;
 use crate::mesh::{Mesh, Normal, UpAxis, wide};
@@ -42,9 +42,9 @@ impl Footprints {
         mesh: &Mesh,
         bodies: &[(Part, Body)],
         target: usize,
-        rules: &BodyRules,
+        rules: &ComponentRules,
     ) -> Option<Self> {
-        let &BodyRules { up, constants, .. } = rules;
+        let &ComponentRules { up, constants, .. } = rules;
         let footprint: f64 = bodies.iter().map(|(_, body)| body.footprint).sum();
         // The side of a square as large as the footprints have for each triangle.
         let share = (footprint / target as f64).sqrt();
@@ -60,12 +60,12 @@ impl Footprints {
         mesh: &Mesh,
         bodies: &[(Part, Body)],
         target: usize,
-        rules: &BodyRules,
+        rules: &ComponentRules,
     ) -> Option<Mesh> {
-        let &BodyRules { up, constants, .. } = rules;
+        let &ComponentRules { up, constants, .. } = rules;
         let Self { heights, regions } = self;
         let count = regions.count().min((target as f64 / TRIANGLES_EACH) as usize).max(1);
-        let least = (constants.crumb * constants.resolution * constants.resolution) as usize;
+        let least = (constants.min_region * constants.resolution * constants.resolution) as usize;
         let labels = regions.down_to(count, least);
         let arcs = arcs(&labels.of_cell, &regions.near, &heights.grid);
         let height = |region: u32, other: u32| match labels.regions.get(&region) {
@@ -74,7 +74,9 @@ impl Footprints {
         };
         let step = |[left, right]: [u32; 2]| height(left, right) - height(right, left);
         let lost = |inside: u32, outside: u32| match labels.regions.get(&inside) {
-            Some(region) if outside == NONE => constants.net * (region.height - region.low),
+            Some(region) if outside == NONE => {
+                constants.footprint_penalty * (region.height - region.low)
+            }
             _ => step([inside, outside]).abs(),
         };
         let mut outlines = Outlines::of(&arcs, step, lost);
@@ -182,7 +184,7 @@ impl Walls<'_> {
             .collect()
     }
 
-    fn push(&self, result: &mut Mesh, corner: DVec2, height: f64, look: &Look) -> u32 {
+    fn push(&self, result: &mut Mesh, corner: DVec2, height: f64, look: &Appearance) -> u32 {
         let place = self.heights.grid.place(corner).extend(height);
         let place: DVec3 = self.up.from_z_up(place);
         result.positions.push(place.as_vec3().to_array());
@@ -199,7 +201,7 @@ impl Walls<'_> {
         result.positions.len() as u32 - 1
     }
 
-    fn roof(&self, result: &mut Mesh, polygon: &[Vec<DVec2>], height: f64, look: Look) {
+    fn roof(&self, result: &mut Mesh, polygon: &[Vec<DVec2>], height: f64, look: Appearance) {
         let mut holes: Vec<u32> = Vec::new();
         let mut corners: Vec<DVec2> = Vec::new();
         for ring in polygon {

@@ -129,7 +129,7 @@ pub(super) struct Regions {
     gaps: Vec<GapCell>,
     first: Vec<Sums>,
     /// See [`PrismConstants`].
-    raise: f64,
+    roof_deviations: f64,
     mergings: Vec<Merging>,
 }
 
@@ -171,9 +171,15 @@ impl Regions {
             sums.covered_squares = sums.squares;
         }
         let gaps = gap_cells(&of_cell, &near, &heights.grid, gap);
-        let mut regions =
-            Self { near, of_cell, gaps, first, raise: constants.raise, mergings: Vec::new() };
-        regions.mergings = Merger::of(&regions, constants.net).run();
+        let mut regions = Self {
+            near,
+            of_cell,
+            gaps,
+            first,
+            roof_deviations: constants.roof_deviations,
+            mergings: Vec::new(),
+        };
+        regions.mergings = Merger::of(&regions, constants.footprint_penalty).run();
         regions
     }
 
@@ -220,7 +226,7 @@ impl Regions {
             let Sums { covered, covered_height, covered_squares, low, .. } = sums[region as usize];
             let mean = covered_height / covered;
             let deviation = (covered_squares / covered - mean * mean).max(0.0).sqrt();
-            (region, Region { height: mean + self.raise * deviation, low })
+            (region, Region { height: mean + self.roof_deviations * deviation, low })
         };
         let regions = left.map(region).collect();
         Labels { of_cell, regions }
@@ -256,7 +262,7 @@ fn flat_regions(heights: &Heights, near: &Near, slope: f64) -> Vec<u32> {
 
 /// The full λ-schedule.
 struct Merger {
-    net: f64,
+    footprint_penalty: f64,
     sums: Vec<Option<Sums>>,
     contacts: Vec<BTreeMap<u32, Contact>>,
     /// Sides of cells at the open.
@@ -267,7 +273,7 @@ struct Merger {
 }
 
 impl Merger {
-    fn of(regions: &Regions, net: f64) -> Self {
+    fn of(regions: &Regions, footprint_penalty: f64) -> Self {
         let count = regions.count();
         let mut pairs: FxHashMap<[u32; 2], Contact> = FxHashMap::default();
         let mut outer = vec![0.0; count];
@@ -305,7 +311,7 @@ impl Merger {
             contacts[b as usize].insert(a, contact);
         }
         Self {
-            net,
+            footprint_penalty,
             sums: regions.first.iter().copied().map(Some).collect(),
             contacts,
             outer,
@@ -339,7 +345,7 @@ impl Merger {
         let mut offers = Vec::new();
         let outer = self.outer[region as usize];
         if outer > 0.0 {
-            offers.push((self.net * sums.volume() / outer, region));
+            offers.push((self.footprint_penalty * sums.volume() / outer, region));
         }
         for (&other, contact) in &self.contacts[region as usize] {
             let Some(others) = self.sums[other as usize].filter(|_| asked(other)) else { continue };
@@ -496,7 +502,7 @@ mod tests {
         let regions = Regions::of(&heights, 4.0, &constants());
         let all = regions.down_to(usize::MAX, 4);
         assert_eq!(all.of_cell, regions.of_cell);
-        // Of one height, and touching: one that has the cells of both.
+        // Regions of one height that touch become one with the cells of both.
         let one = regions.down_to(1, 4);
         let covered = |labels: &Labels| labels.of_cell.iter().filter(|&&of| of != NONE).count();
         assert_eq!((one.regions.len(), covered(&one)), (1, covered(&all)));

@@ -11,8 +11,8 @@
 //! is settled, and what is left around, so that equal surfaces with other triangles take about as
 //! many polygons as their triangles overlap in.
 //!
-//! Where parts of the surfaces are off the source themselves, a bound of how far is added to the
-//! distance from them and to them, place by place: the triangle inequality.
+//! Surfaces may have an offset from the source themselves. It is added to distances from them and to them
+//! (triangle inequality).
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -20,9 +20,9 @@ use std::collections::BinaryHeap;
 use glam::{DVec3, Vec3};
 
 use super::bvh::{Box3, LEAF};
-use super::original::{Original, Search, TriangleId};
-use super::overlay::{Mark, Marks, Overlay};
+use super::overlay::{Overlay, VisitState, VisitStates};
 use super::polygon::{Clipped, MOST_CORNERS, Polygon, bisect, centroid, clip};
+use super::searchable_surface::{Search, SearchableSurface, TriangleId};
 use super::triangle::{LANES, Points, Triangle, max};
 use crate::builder::constants::MeasureConstants;
 
@@ -31,7 +31,7 @@ pub const TIGHTNESS: f32 = 1.1;
 
 /// The largest distance of both ways, as far as it is known.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Largest {
+pub(super) struct MaxDistance {
     /// Found at a point.
     pub found: f32,
     /// Smaller distances are not told apart.
@@ -44,7 +44,7 @@ pub(super) struct Largest {
     pub divisions: usize,
 }
 
-impl Largest {
+impl MaxDistance {
     /// Nothing less than `least` is told apart.
     pub fn at_least(least: f32) -> Self {
         let found = least / TIGHTNESS;
@@ -92,15 +92,15 @@ impl Part {
 }
 
 /// From a surface to another; neither may be empty.
-pub(super) struct Directed<'a> {
-    from: &'a Original,
+pub(super) struct OneSidedHausdorff<'a> {
+    from: &'a SearchableSurface,
     /// What the way back has told of its triangles.
-    marks: Option<Marks>,
+    visit_states: Option<VisitStates>,
     /// By how much computed distances may be wrong.
     rounding: f32,
     search: Search<'a>,
     overlay: Overlay<'a>,
-    largest: Largest,
+    largest: MaxDistance,
     budget: usize,
     constants: MeasureConstants,
 }
@@ -115,7 +115,7 @@ struct Open {
 }
 
 /// Measures some points, spread evenly.
-pub(super) fn seed(from: &Original, to: &Original, largest: &mut Largest) {
+pub(super) fn seed(from: &SearchableSurface, to: &SearchableSurface, largest: &mut MaxDistance) {
     let mut search = Search::new(to);
     let leaves: usize = from.parts.iter().map(|part| part.bvh.leaves.len()).sum();
     let all = (0..).zip(&from.parts);
@@ -129,25 +129,30 @@ pub(super) fn seed(from: &Original, to: &Original, largest: &mut Largest) {
     }
 }
 
-impl<'a> Directed<'a> {
-    pub fn new(from: &'a Original, to: &'a Original, largest: Largest, rounding: f32) -> Self {
+impl<'a> OneSidedHausdorff<'a> {
+    pub fn new(
+        from: &'a SearchableSurface,
+        to: &'a SearchableSurface,
+        largest: MaxDistance,
+        rounding: f32,
+    ) -> Self {
         let triangles = from.triangle_count() + to.triangle_count();
         let constants = from.constants;
         let budget = constants.divisions.max(constants.divisions_per_triangle * triangles);
         let (search, overlay) = (Search::new(to), Overlay::new(to));
-        Self { from, marks: None, rounding, search, overlay, largest, budget, constants }
+        Self { from, visit_states: None, rounding, search, overlay, largest, budget, constants }
     }
 
     /// With what the way back has told. The surface it goes to must be of one mesh.
-    pub fn with_marks(self, marks: Marks) -> Self {
-        let settled = self.largest.settled.max(marks.farthest);
-        let largest = Largest { settled, ..self.largest };
-        Self { marks: Some(marks), largest, ..self }
+    pub fn with_visit_states(self, visit_states: VisitStates) -> Self {
+        let settled = self.largest.settled.max(visit_states.farthest);
+        let largest = MaxDistance { settled, ..self.largest };
+        Self { visit_states: Some(visit_states), largest, ..self }
     }
 
     /// Raises the largest distance to what it is, or to what the budget can say; also what was
     /// learnt of the other surface.
-    pub fn run(mut self) -> (Largest, Marks) {
+    pub fn run(mut self) -> (MaxDistance, VisitStates) {
         let mut open = Vec::new();
         for (number, part) in (0..).zip(&self.from.parts) {
             self.child(number, part.bvh.tree.root, part.bvh.bounds, &mut open);
@@ -157,7 +162,7 @@ impl<'a> Directed<'a> {
             self.triangle(triangle, &mut left);
         }
         self.divide_rest(left);
-        (self.largest, self.overlay.into_marks())
+        (self.largest, self.overlay.into_visit_states())
     }
 
     /// Measures a point of a mesh of the surface, to no less than `enough` or the largest so far.
@@ -174,7 +179,7 @@ impl<'a> Directed<'a> {
         (near.squared.sqrt() + self.off(of, near.id), near.id)
     }
 
-    /// How far a mesh and the other surface at a triangle may be off, added up.
+    /// Returns the sum of the surface offsets of a mesh and of the other surface at a triangle.
     fn off(&self, of: u32, at: TriangleId) -> f32 {
         self.from.off(of) + self.search.original().off(at.part)
     }
@@ -211,12 +216,13 @@ impl<'a> Directed<'a> {
     /// The lanes of a leaf that the way back has not settled, one bit each.
     fn unsettled(&self, part: u32, leaf: u32) -> u32 {
         let count = self.from.parts[part as usize].bvh.counts[leaf as usize];
-        let is_open = |&lane: &u32| !self.mark(part, leaf, lane).is_some_and(Mark::is_settled);
+        let is_open =
+            |&lane: &u32| !self.mark(part, leaf, lane).is_some_and(VisitState::is_settled);
         (0..count.into()).filter(is_open).fold(0, |lanes, lane| lanes | 1 << lane)
     }
 
-    fn mark(&self, part: u32, leaf: u32, lane: u32) -> Option<Mark> {
-        Some(self.marks.as_ref()?.of(TriangleId { part, leaf, lane }))
+    fn mark(&self, part: u32, leaf: u32, lane: u32) -> Option<VisitState> {
+        Some(self.visit_states.as_ref()?.of(TriangleId { part, leaf, lane }))
     }
 
     /// Settles triangles of a leaf, all at a time, by triangles of the other surface that one of
@@ -228,7 +234,7 @@ impl<'a> Directed<'a> {
         let mut unsettled = self.unsettled(part, leaf);
         while unsettled != 0 {
             let chosen = unsettled.trailing_zeros() as usize;
-            let marked = self.mark(part, leaf, chosen as u32).and_then(Mark::slot);
+            let marked = self.mark(part, leaf, chosen as u32).and_then(VisitState::slot);
             let start = marked.map(|slot| TriangleId::of_slot(0, slot)).unwrap_or_else(|| {
                 let [a, b, c] = [0, 1, 2].map(|corner| corners[corner].lane(chosen));
                 let centre = (a + b + c) / 3.0;
@@ -281,8 +287,8 @@ impl<'a> Directed<'a> {
         if nearest.1 != start && self.settles_overlay(&triangle, id, nearest.1) {
             return;
         }
-        // Where layers of a folded surface lie on each other at the centre, the walk may begin on
-        // one that ends; there are fewer of them far from it.
+        // Layers of a folded surface may coincide at the centre, and the walk may begin on one that ends.
+        // Fewer of them reach the corner that is farthest from it.
         let reach = |corner: &Vec3| corner.distance_squared(centre);
         let far = corners.into_iter().max_by(|a, b| reach(a).total_cmp(&reach(b)));
         let (_, near) = self.measure(id.part, far.unwrap_or(centre), 0.0);
@@ -295,9 +301,9 @@ impl<'a> Directed<'a> {
 
     fn settles_overlay(&mut self, triangle: &Triangle, id: TriangleId, start: TriangleId) -> bool {
         let limit = self.largest.limit() - self.from.off(id.part);
-        // What is walked over is within the limit of the triangle.
+        // The walk visits triangles within the limit only.
         let to = self.search.original();
-        let off = to.most_off_near(Box3::of(triangle.corners()), limit);
+        let off = to.max_surface_offset_near(Box3::of(triangle.corners()), limit);
         if limit <= off {
             return false;
         }

@@ -15,8 +15,8 @@ use crate::mesh::box_tree::BoxTree;
 use crate::mesh::{DisjointSet, Model, PositionKey, key};
 
 /// The block that has all of a triangle's body; `NONE` where planes divide it.
-pub struct Bodies {
-    /// By part and triangle; empty where no body crosses a plane.
+pub struct KeptWhole {
+    /// Block number by part and triangle; empty if no component crosses a plane.
     blocks: Vec<Vec<u32>>,
 }
 
@@ -31,7 +31,7 @@ struct Body {
     block: u32,
 }
 
-impl Bodies {
+impl KeptWhole {
     /// The bodies of a model, its triangles connected where they share positions. None with more than
     /// `most` triangles stays whole, and none that may go on where it is open, in what `others` have.
     pub fn new(model: &Model, partition: &Partition, most: usize, others: &Others) -> Self {
@@ -111,8 +111,8 @@ fn join_places(model: &Model, sets: &mut DisjointSet) {
     }
 }
 
-/// Of the bodies that stay whole though planes cross them, those that are open where others have
-/// something: they may be one surface with it.
+/// Finds components that cross a plane and have open edges near another input. They may continue in it,
+/// so they are not kept whole.
 fn open_in(
     model: &Model,
     sets: &mut DisjointSet,
@@ -123,7 +123,7 @@ fn open_in(
     let crossed = |body: &Body| {
         body.block != NONE && !partition.cell(body.block).place.holds_within(&body.place)
     };
-    // By edge: the body, and whether an odd number of triangles has it.
+    // Component by edge, and whether an odd number of triangles has the edge.
     let mut edges: FxHashMap<[PositionKey<f64>; 2], (u32, bool, [[f64; 3]; 2])> =
         FxHashMap::default();
     let mut first = 0u32;

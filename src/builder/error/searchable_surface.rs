@@ -14,13 +14,13 @@ use crate::mesh::Mesh;
 /// A surface of one or several meshes, searchable; built once and shared by all levels above it.
 /// Cheap to clone.
 #[derive(Clone, Debug)]
-pub struct Original {
+pub struct SearchableSurface {
     pub(super) parts: Vec<Arc<Part>>,
     /// Over the boxes of the parts, one to a leaf.
     top: Arc<Tree>,
     /// The part of each leaf.
     numbers: Vec<u32>,
-    /// Where parts meet; computed when first needed.
+    /// Neighbours across the borders of parts, computed when first needed.
     links: Arc<OnceLock<Links>>,
     pub(super) bounds: Box3,
     /// The longest edge.
@@ -29,7 +29,7 @@ pub struct Original {
     pub(super) constants: MeasureConstants,
     /// A bound of the distance between each part and the source, both ways, metres; empty where
     /// all are 0.
-    offs: Arc<[f32]>,
+    surface_offsets: Arc<[f32]>,
 }
 
 /// One mesh.
@@ -77,7 +77,7 @@ fn faces(mesh: &Mesh, leaves: &[Vec<u32>]) -> Vec<Face> {
     faces
 }
 
-/// A triangle of an [`Original`].
+/// A triangle of an [`SearchableSurface`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TriangleId {
     pub part: u32,
@@ -95,7 +95,7 @@ impl TriangleId {
     }
 }
 
-impl Original {
+impl SearchableSurface {
     /// The surface of one mesh.
     pub fn of(mesh: &Mesh, constants: MeasureConstants) -> Self {
         if mesh.triangles.is_empty() {
@@ -170,14 +170,14 @@ impl Original {
         let constants = parts.first().map_or_else(Default::default, |part| part.constants);
         let all = parts.iter().flat_map(|part| part.parts.iter().cloned());
         let union = Self::from_parts(all.collect(), constants);
-        if parts.iter().all(|part| part.offs.is_empty()) {
+        if parts.iter().all(|part| part.surface_offsets.is_empty()) {
             return union;
         }
-        let offs = |part: &Arc<Self>| {
+        let surface_offsets = |part: &Arc<Self>| {
             let part = Arc::clone(part);
             (0..part.parts.len() as u32).map(move |number| part.off(number))
         };
-        Self { offs: parts.iter().flat_map(offs).collect(), ..union }
+        Self { surface_offsets: parts.iter().flat_map(surface_offsets).collect(), ..union }
     }
 
     /// What the triangle nearest to a point looks like; `None` where [`Self::faces`] has none.
@@ -200,34 +200,34 @@ impl Original {
             links: Arc::default(),
             parts,
             constants,
-            offs: Arc::default(),
+            surface_offsets: Arc::default(),
         }
     }
 
     /// The same surface, at most `off` metres from the source, both ways.
-    pub fn with_off(self, off: f64) -> Self {
+    pub fn with_surface_offset(self, off: f64) -> Self {
         let count = if off > 0.0 { self.parts.len() } else { 0 };
-        Self { offs: vec![off as f32; count].into(), ..self }
+        Self { surface_offsets: vec![off as f32; count].into(), ..self }
     }
 
     /// A bound of the distance between a part and the source, metres.
     pub(super) fn off(&self, part: u32) -> f32 {
-        self.offs.get(part as usize).copied().unwrap_or(0.0)
+        self.surface_offsets.get(part as usize).copied().unwrap_or(0.0)
     }
 
     /// The largest of all parts.
-    pub(super) fn most_off(&self) -> f32 {
-        self.offs.iter().copied().fold(0.0, f32::max)
+    pub(super) fn max_surface_offset(&self) -> f32 {
+        self.surface_offsets.iter().copied().fold(0.0, f32::max)
     }
 
     /// The largest of the parts whose boxes are within `reach` of a box along each axis.
-    pub(super) fn most_off_near(&self, bounds: Box3, reach: f32) -> f32 {
-        let near = self.parts.iter().zip(&*self.offs);
+    pub(super) fn max_surface_offset_near(&self, bounds: Box3, reach: f32) -> f32 {
+        let near = self.parts.iter().zip(&*self.surface_offsets);
         let near = near.filter(|(part, _)| part.bvh.bounds.is_within(reach, bounds));
         near.map(|(_, &off)| off).fold(0.0, f32::max)
     }
 
-    /// Where parts meet.
+    /// Returns the neighbours across the borders of parts.
     pub(super) fn links(&self) -> &Links {
         let adjacencies = || self.parts.iter().map(|part| &part.adjacency);
         self.links.get_or_init(|| Links::between(adjacencies()))
@@ -243,7 +243,7 @@ impl Original {
         if self.is_empty() { 0.0 } else { self.bounds.diagonal().into() }
     }
 
-    /// Of all triangles, square metres.
+    /// Returns the area of all triangles, square metres.
     pub fn area(&self) -> f64 {
         self.parts.iter().map(|part| part.samples.area).sum()
     }
@@ -267,9 +267,9 @@ pub(super) struct Near {
     pub id: TriangleId,
 }
 
-/// Asks an [`Original`], which must not be empty, for what is near points.
+/// Asks an [`SearchableSurface`], which must not be empty, for what is near points.
 pub(super) struct Search<'a> {
-    original: &'a Original,
+    original: &'a SearchableSurface,
     stack: Vec<(f32, u32, u32)>,
     /// What was near the point before is often near the next one.
     last: TriangleId,
@@ -279,12 +279,12 @@ pub(super) struct Search<'a> {
 const TOP: u32 = u32::MAX;
 
 impl<'a> Search<'a> {
-    pub fn new(original: &'a Original) -> Self {
+    pub fn new(original: &'a SearchableSurface) -> Self {
         let last = TriangleId { part: 0, leaf: 0, lane: 0 };
         Self { original, stack: Vec::with_capacity(128), last }
     }
 
-    pub fn original(&self) -> &'a Original {
+    pub fn original(&self) -> &'a SearchableSurface {
         self.original
     }
 
@@ -296,7 +296,7 @@ impl<'a> Search<'a> {
         mut reach: f32,
         mut visit: impl FnMut(u32, u32) -> f32,
     ) {
-        let Original { parts, top, numbers, .. } = self.original;
+        let SearchableSurface { parts, top, numbers, .. } = self.original;
         self.stack.clear();
         self.stack.push((0.0, TOP, top.root));
         while let Some((squared, part, child)) = self.stack.pop() {
@@ -346,7 +346,7 @@ impl<'a> Search<'a> {
         let mut best = Near { squared: f32::INFINITY, id: self.last };
         let first = self.last;
         self.leaf(first.part, first.leaf, at, &mut best);
-        let Original { parts, top, numbers, .. } = self.original;
+        let SearchableSurface { parts, top, numbers, .. } = self.original;
         if !is_enough(&best) {
             self.stack.clear();
             let start = match &parts[..] {
