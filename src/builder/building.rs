@@ -16,7 +16,7 @@ use crate::builder::built::{BuiltBlock, BuiltBlocks};
 use crate::builder::checkpoint::Checkpoints;
 use crate::builder::cut::cell::CellCut;
 use crate::builder::inputs::text_of;
-use crate::builder::memory::{give_back, total_bytes};
+use crate::builder::memory::total_bytes;
 use crate::builder::options::BuildOptions;
 use crate::builder::partition::{CellBox, Others};
 use crate::builder::plan::{KnownInput, Plan, PlannedBlock};
@@ -142,9 +142,6 @@ impl Building<'_> {
                     true => made.empty.push(block.empty()),
                     false => drop(made.blocks.insert(block.cell, blocks)),
                 }
-            }
-            if self.options.max_memory.is_some() {
-                give_back();
             }
             checkpoints.finished(&made, &inputs, self.plan, self.output)?;
         }

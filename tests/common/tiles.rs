@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use hlod::color::linear_to_srgb;
 use hlod::mesh::{Model, Part, TextureData};
 
 /// A corner: place and texture coordinate.
@@ -152,6 +153,7 @@ fn library(model: &Model, dir: &Path) -> std::io::Result<String> {
     let mut text = String::new();
     for material in &model.materials {
         let [r, g, b, a] = material.base_color;
+        let [r, g, b] = [r, g, b].map(|linear| linear_to_srgb(linear.into()));
         let _ = writeln!(text, "newmtl {}\nKd {r} {g} {b}\nd {a}", material.name);
         let Some(texture) = material.texture else { continue };
         let path = match &model.textures[texture as usize].data {
