@@ -48,8 +48,8 @@ fn leaves_are_the_source() {
         for options in every_option() {
             let nodes = build(piece.clone(), lattice, &options);
             let leaves: Vec<_> = nodes.iter().filter(|node| node.is_leaf()).collect();
-            let childless = |node: &&OutlineCoverage| {
-                let is_child = |other: &OutlineCoverage| {
+            let childless = |node: &&WrittenNode| {
+                let is_child = |other: &WrittenNode| {
                     other.level == node.level + 1 && other.child_path.starts_with(&node.child_path)
                 };
                 !nodes.iter().any(is_child)
@@ -68,7 +68,7 @@ fn leaves_are_the_source() {
 /// Edges of a front that only one node has, and that are neither edges of the original border
 /// nor under skirts: through these one could see.
 fn unsealed(
-    front: &[&OutlineCoverage],
+    front: &[&WrittenNode],
     leaf_edges: &BTreeSet<[hlod::mesh::PositionKey<f32>; 2]>,
     lattice: Lattice,
 ) -> usize {

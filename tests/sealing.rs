@@ -25,17 +25,14 @@ use hlod::texture::{BakeClasses, BakePlan, BakeReason};
 const RAYS: usize = 300;
 
 /// Nodes of a mixture of levels, one over every part of the block.
-type Front<'a> = Vec<&'a OutlineCoverage>;
+type Front<'a> = Vec<&'a WrittenNode>;
 
 /// The front that stops at nodes for which `stop` says so, and at leaves.
-fn front<'a>(
-    nodes: &'a [OutlineCoverage],
-    mut stop: impl FnMut(&OutlineCoverage) -> bool,
-) -> Front<'a> {
+fn front<'a>(nodes: &'a [WrittenNode], mut stop: impl FnMut(&WrittenNode) -> bool) -> Front<'a> {
     let mut front = Vec::new();
     let mut open = vec![&nodes[0]];
     while let Some(node) = open.pop() {
-        let children: Vec<&OutlineCoverage> = nodes
+        let children: Vec<&WrittenNode> = nodes
             .iter()
             .filter(|child| {
                 child.level == node.level + 1 && child.child_path.starts_with(&node.child_path)
@@ -51,26 +48,26 @@ fn front<'a>(
 }
 
 /// Fronts with neighbours as different as can be, and random ones.
-fn mixed_fronts(nodes: &[OutlineCoverage], seed: u64) -> Vec<(String, Front<'_>)> {
+fn mixed_fronts(nodes: &[WrittenNode], seed: u64) -> Vec<(String, Front<'_>)> {
     let deepest = nodes.iter().map(|node| node.level).max().unwrap();
     let mut fronts = Vec::new();
     // The largest subtrees as they are beside leaves, and the other way round.
     for parity in 0..2 {
-        let stop = |node: &OutlineCoverage| node.child_path[0] % 2 == parity;
+        let stop = |node: &WrittenNode| node.child_path[0] % 2 == parity;
         fronts.push((format!("subtrees of parity {parity} beside leaves"), front(nodes, stop)));
     }
     // Alternating at every depth, by all the numbers of the place.
     for parity in 0..2 {
-        let stop = |node: &OutlineCoverage| node.child_path.iter().sum::<u32>() % 2 == parity;
+        let stop = |node: &WrittenNode| node.child_path.iter().sum::<u32>() % 2 == parity;
         fronts.push((format!("checkerboard {parity}"), front(nodes, stop)));
     }
     // Two levels apart everywhere: a coarse border meets several finer ones.
     for coarse in 1..deepest.saturating_sub(1) {
-        let stop = |node: &OutlineCoverage| {
+        let stop = |node: &WrittenNode| {
             let odd = node.child_path[coarse - 1] % 2 == 1;
             node.level == if odd { coarse } else { coarse + 2 }
         };
-        let stop = |node: &OutlineCoverage| node.level >= coarse && stop(node);
+        let stop = |node: &WrittenNode| node.level >= coarse && stop(node);
         fronts.push((format!("levels {coarse} and {}", coarse + 2), front(nodes, stop)));
     }
     let mut random = Random::new(seed, 0);
@@ -81,7 +78,7 @@ fn mixed_fronts(nodes: &[OutlineCoverage], seed: u64) -> Vec<(String, Front<'_>)
 }
 
 /// The node's triangles as its file has them.
-fn drawn(node: &OutlineCoverage, with_skirts: bool) -> Mesh {
+fn drawn(node: &WrittenNode, with_skirts: bool) -> Mesh {
     let mut mesh = node.mesh.clone();
     if with_skirts {
         skirt::append(&mut mesh, &node.skirts);

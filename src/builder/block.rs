@@ -31,7 +31,7 @@ use crate::texture::BakeReason;
 /// Steps of simplification that borders between blocks are ranked for.
 const RANKED_STEPS: u32 = 8;
 
-/// This identifies a block.
+/// Identifies a block.
 #[derive(Clone)]
 pub struct BlockLabel {
     /// Beginning of its files' names, unique in the output.
@@ -46,17 +46,17 @@ pub struct BlockLabel {
 
 /// A block about to be built.
 pub struct Draft {
-    /// This identifies it.
+    /// Identity of the block.
     pub label: BlockLabel,
     /// Triangles of the block from all inputs. Material numbers index its [`BlockMaterials`].
     pub parts: BlockParts,
-    /// This cuts triangles at the sides of its cell.
+    /// Cutter of triangles at the sides of its cell.
     pub cut: CellCut,
 }
 
-/// This builds one block.
+/// Builds one block.
 pub struct DraftBuilder<'a> {
-    /// The block has these materials.
+    /// Materials of the block.
     pub materials: &'a BlockMaterials,
     /// It says how nodes are made, and writes them.
     pub setup: &'a BlockSetup<'a>,

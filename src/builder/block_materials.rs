@@ -121,7 +121,7 @@ impl Collecting {
 pub struct BlockMaterials {
     /// Without triangles.
     pub model: Model,
-    /// This says how its materials may be treated.
+    /// Properties of its materials.
     pub looks: Appearances,
     folding: Folding,
     inputs: Vec<PathBuf>,

@@ -32,19 +32,19 @@ use crate::mesh::box_tree::BoxTree;
 use crate::report::build_report::Count;
 use crate::texture::{Announced, DecodedImages, SharedTextures, TextureCache};
 
-/// This builds blocks.
+/// Builds blocks.
 pub struct Building<'a> {
     /// Options of the build.
     pub options: &'a BuildOptions,
-    /// This reads inputs.
+    /// Reader of inputs.
     pub preparing: &'a Preparing<'a>,
-    /// This says what is to be built.
+    /// Plan of the build.
     pub plan: &'a Plan,
-    /// These are the paths of all inputs.
+    /// Paths of all inputs.
     pub inputs: &'a [PathBuf],
     /// The output in the making.
     pub output: &'a OutputDir,
-    /// This counts the time of each stage.
+    /// Timers of the stages.
     pub stages: &'a Stages,
     /// Is told of it.
     pub progress: &'a dyn Progress,
@@ -55,7 +55,7 @@ pub struct Building<'a> {
 /// A block whose inputs are not all there yet.
 struct Waiting<'a> {
     block: &'a PlannedBlock,
-    /// These are its parts of the inputs that are there, by the number of the input.
+    /// Parts from the inputs that are read, by input number.
     parts: BTreeMap<usize, (Arc<InputAppearance>, BlockParts)>,
     /// Number of inputs that are not read yet.
     left: usize,

@@ -31,7 +31,7 @@ pub fn border_file(name: &str) -> String {
     format!("{BORDERS_DIR}/{name}.border")
 }
 
-/// These are the blocks that were built or taken over.
+/// Blocks that were built or reused.
 #[derive(Default)]
 pub struct BuiltBlocks {
     /// Blocks by cell number, those of a cell in order.
@@ -40,6 +40,6 @@ pub struct BuiltBlocks {
     pub empty: Vec<EmptyBlock>,
     /// Shared textures of earlier results, by name.
     pub reused_textures: BTreeMap<String, SharedTexture>,
-    /// This build has made these.
+    /// Shared textures that this build made.
     pub shared: SharedTextures,
 }

@@ -33,7 +33,7 @@ use crate::report::build_report::{
 use crate::texture::SharedTextures;
 use crate::{Error, Result, tileset};
 
-/// This ends a build.
+/// Finishes a build.
 pub struct Finishing<'a> {
     /// Options of the build.
     pub options: &'a BuildOptions,
@@ -41,7 +41,7 @@ pub struct Finishing<'a> {
     pub globe: Option<&'a Globe>,
     /// The output in the making.
     pub output: &'a OutputDir,
-    /// This counts the time of each stage.
+    /// Timers of the stages.
     pub stages: &'a Stages,
     /// Is told of it.
     pub progress: &'a dyn Progress,

@@ -35,7 +35,7 @@ pub struct PlannedBlock {
 }
 
 impl PlannedBlock {
-    /// This, where nothing is left of it.
+    /// Returns the report's entry of a block without a triangle.
     pub fn empty(&self) -> EmptyBlock {
         EmptyBlock { name: self.name.clone(), content_hash: self.content_hash.clone() }
     }
@@ -93,7 +93,7 @@ impl Plan {
     }
 }
 
-/// A block depends on these beside its own cell.
+/// Other blocks and inputs that a block depends on.
 #[derive(Default)]
 struct Surroundings {
     /// The blocks of which bodies may lie here: how large these are at most decides which stay whole.

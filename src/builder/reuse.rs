@@ -31,7 +31,7 @@ pub struct PreviousBuild {
     pub report: BuildReport,
     /// True where its tileset is whole, and for the same place.
     pub tileset: bool,
-    /// This is known of its inputs.
+    /// Facts of its inputs.
     inputs: Vec<KnownInput>,
     /// Index of inputs by path.
     input_of: FxHashMap<String, usize>,
@@ -130,14 +130,15 @@ impl PreviousBuild {
         &self.inputs
     }
 
-    /// The blocks of a name that are made of this, and what lies far off beside it; none of one that is empty.
+    /// Returns the numbers of the blocks with a name and content hash: none if the block was empty, several if
+    /// outliers have blocks of their own. `None` if there is no such block.
     pub fn blocks(&self, name: &str, content_hash: &str) -> Option<&[usize]> {
         let numbers = self.block_of.get(content_hash)?;
         let is_of = |&number: &usize| self.report.blocks[number].name.starts_with(name);
         numbers.iter().all(is_of).then_some(numbers)
     }
 
-    /// Takes over [blocks](Self::blocks) that a planned one has become.
+    /// Reuses the [blocks](Self::blocks) of a planned block.
     pub fn reuse_blocks(
         &self,
         block: &PlannedBlock,

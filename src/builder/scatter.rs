@@ -6,7 +6,7 @@ use rustc_hash::FxHashMap;
 use crate::builder::partition::{CellBox, KeptWhole, Others, Partition};
 use crate::mesh::{Model, Part};
 
-/// A block gets these triangles of an input.
+/// Triangles of an input that one block gets.
 #[derive(Debug, Default)]
 pub struct BlockParts {
     /// Triangles that are within the block, and those of bodies that are of it as a whole.

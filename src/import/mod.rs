@@ -21,7 +21,7 @@ mod names;
 mod obj;
 mod opacity;
 mod page_uses;
-mod paged;
+mod paged_vec;
 mod paths;
 mod plain_text;
 mod texture_statement;

@@ -36,7 +36,7 @@ use super::clean::{CleanStats, clean};
 use super::mtl::{FIRST_TILE, Library, MtlMaterial};
 use super::names::{self, NameSample};
 use super::page_uses::PageUses;
-use super::paged::PagedVec;
+use super::paged_vec::PagedVec;
 use super::paths::Finder;
 use super::plain_text::PlainText;
 use super::textures::{OpacityCache, Textures};

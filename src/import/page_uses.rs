@@ -1,6 +1,6 @@
 //! When the last vertex has taken what it needs from a page.
 
-use super::paged::page_of;
+use super::paged_vec::page_of;
 use super::vertices::{NONE, Pair};
 
 /// How many vertices to come use each page of positions and of texture coordinates.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::paged::{PagedVec, page_of};
+use super::paged_vec::{PagedVec, page_of};
 
 /// No index.
 pub(super) const NONE: u32 = u32::MAX;

@@ -28,7 +28,7 @@ pub struct BuildReport {
     pub inputs: Vec<InputReport>,
     /// Blocks, in the order of the scene.
     pub blocks: Vec<BlockReport>,
-    /// Planned blocks of which nothing is left: all that is there stays whole on the other side of a cut.
+    /// Planned blocks without a triangle: all components in them are kept whole in a neighbour.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub empty_blocks: Vec<EmptyBlock>,
     /// Triangles of all inputs after import.
@@ -137,7 +137,7 @@ pub struct InputReport {
     pub triangles: u64,
     /// Which of its axes points at the sky.
     pub up: UpAxis,
-    /// How the axis was determined; `None` in results of earlier versions.
+    /// The evidence that determined the axis; `None` in results of earlier versions.
     #[serde(default)]
     pub up_from: Option<UpFrom>,
     /// Warnings and how often each occurred, in order of occurrence.

@@ -33,9 +33,9 @@ impl Front {
         Self::new(scene, nodes)
     }
 
-    /// The front that comes from the roots by replacing the node of the largest
-    /// [viewer's error](Scene::viewer_errors) by its children, again and again, as long as it has at most
-    /// `most_triangles`. The roots stay where they alone have more.
+    /// Returns the front of at most `most_triangles` that viewers refine to: the node with the largest
+    /// [error](Scene::viewer_errors) is replaced by its children until they do not fit. The roots are kept
+    /// even if they have more.
     pub fn of_size(scene: &Scene, most_triangles: u64) -> Self {
         let errors = scene.viewer_errors();
         let ranked = |node: u32| {

@@ -161,7 +161,7 @@ pub fn block(mesh: Mesh<f64>) -> (Chunk, Lattice) {
 
 /// A node as the sink saw it.
 #[derive(Clone, Debug)]
-pub struct OutlineCoverage {
+pub struct WrittenNode {
     pub mesh: Mesh,
     pub skirts: Vec<hlod::builder::border::skirt::Skirt>,
     pub level: usize,
@@ -172,15 +172,15 @@ pub struct OutlineCoverage {
     pub locked: usize,
 }
 
-impl OutlineCoverage {
+impl WrittenNode {
     pub fn is_leaf(&self) -> bool {
         self.step == LadderStep::Original
     }
 }
 
 /// The nodes of a level and the leaves above it.
-pub fn at_level(nodes: &[OutlineCoverage], level: usize) -> Vec<&OutlineCoverage> {
-    let of = |node: &&OutlineCoverage| node.level == level || node.level < level && node.is_leaf();
+pub fn at_level(nodes: &[WrittenNode], level: usize) -> Vec<&WrittenNode> {
+    let of = |node: &&WrittenNode| node.level == level || node.level < level && node.is_leaf();
     nodes.iter().filter(of).collect()
 }
 
@@ -192,13 +192,13 @@ pub fn all_nodes() -> Constants {
 
 /// Keeps all nodes.
 #[derive(Default)]
-pub struct MemorySink(pub Mutex<Vec<OutlineCoverage>>);
+pub struct MemorySink(pub Mutex<Vec<WrittenNode>>);
 
 impl NodeSink for MemorySink {
     type Record = ();
 
     fn take(&self, node: &NodeDraft) -> hlod::Result<()> {
-        self.0.lock().unwrap().push(OutlineCoverage {
+        self.0.lock().unwrap().push(WrittenNode {
             mesh: node.mesh.clone(),
             skirts: node.skirts.to_vec(),
             level: node.level(),
@@ -213,7 +213,7 @@ impl NodeSink for MemorySink {
 }
 
 /// Builds a block in memory; nodes sorted by level and place.
-pub fn build(chunk: Chunk, lattice: Lattice, options: &HierarchyOptions) -> Vec<OutlineCoverage> {
+pub fn build(chunk: Chunk, lattice: Lattice, options: &HierarchyOptions) -> Vec<WrittenNode> {
     build_baked(chunk, lattice, options, None)
 }
 
@@ -223,7 +223,7 @@ pub fn build_baked(
     lattice: Lattice,
     options: &HierarchyOptions,
     bake: Option<BakePlan>,
-) -> Vec<OutlineCoverage> {
+) -> Vec<WrittenNode> {
     let sink = MemorySink::default();
     let builder = BlockBuilder {
         options,

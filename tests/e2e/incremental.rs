@@ -118,9 +118,9 @@ fn a_touched_but_unchanged_input_is_unchanged() {
     assert!(is_up_to_date(&build(folder.path(), &["parts", "out"])));
 }
 
-/// Of one block there is nothing but a side of a small box, which stays whole in the next.
+/// One block has a side of a small box alone, and the box is kept whole in the next block.
 #[test]
-fn what_an_empty_block_is_made_of_is_not_read_again() {
+fn inputs_of_an_empty_block_are_not_read_again() {
     struct Read(Mutex<Vec<String>>);
     impl Progress for Read {
         fn reading(&self, input: &Path, _: usize, _: usize) {

@@ -21,7 +21,7 @@ use crate::mesh::{Normal, Part, PositionKey, color_key, key, texcoord_key};
 /// A triangle that meets a side of a cell, and what it looks like.
 #[derive(Clone, Debug)]
 pub struct SideTriangle {
-    /// This holds its corners.
+    /// The corners.
     pub triangle: Triangle,
     /// Appearance of each corner.
     looks: [Appearance; 3],

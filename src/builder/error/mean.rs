@@ -10,7 +10,7 @@ use crate::mesh::Mesh;
 pub struct MeanDistance {
     /// Others are measured to this surface.
     surface: SearchableSurface,
-    /// They are measured from these points.
+    /// Sample points of the mesh.
     points: Vec<Vec3>,
     constants: MeasureConstants,
 }

@@ -77,7 +77,7 @@ fn faces(mesh: &Mesh, leaves: &[Vec<u32>]) -> Vec<Face> {
     faces
 }
 
-/// A triangle of an [`SearchableSurface`].
+/// A triangle of a [`SearchableSurface`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TriangleId {
     pub part: u32,
@@ -267,7 +267,7 @@ pub(super) struct Near {
     pub id: TriangleId,
 }
 
-/// Asks an [`SearchableSurface`], which must not be empty, for what is near points.
+/// Asks a [`SearchableSurface`], which must not be empty, for what is near points.
 pub(super) struct Search<'a> {
     original: &'a SearchableSurface,
     stack: Vec<(f32, u32, u32)>,

@@ -45,7 +45,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let (outcome, _) = self.coarse_node(source, node)?;
         Ok(match outcome {
             Outcome::Written(record) => Ok(record),
-            Outcome::SkippedNode(left_out) => Err(left_out),
+            Outcome::Skipped(left_out) => Err(left_out),
         })
     }
 }

@@ -71,11 +71,11 @@ struct Coarse {
     skirts: Vec<Skirt>,
 }
 
-/// This simplifies a node.
+/// Simplifies a node.
 struct NodeLadder<'a> {
     /// The normals of each corner are welded.
     source: Mesh,
-    /// This is the same with its border thinned.
+    /// The source with its border thinned.
     mesh: Mesh,
     border: Border,
     normal_sets: Option<NormalSets>,
@@ -89,7 +89,7 @@ struct NodeLadder<'a> {
 /// How a coarse node ends.
 pub(super) enum Outcome<R> {
     Written(R),
-    SkippedNode(SkippedNode),
+    Skipped(SkippedNode),
 }
 
 impl<R> Outcome<R> {
@@ -104,7 +104,7 @@ impl<R> Outcome<R> {
             Self::Written(record) => {
                 forest.trees = vec![Tree { record, children: forest.trees }];
             }
-            Self::SkippedNode(node) => forest.left_out.push(node),
+            Self::Skipped(node) => forest.left_out.push(node),
         }
         forest
     }
@@ -159,7 +159,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             let triangles = (mesh.triangles.len() + triangles_of(&skirts)) as u64;
             let child_path = node.child_path.to_vec();
             // Nobody draws it: what is above need not be farther off than what is below.
-            (Outcome::SkippedNode(SkippedNode { child_path, triangles, kept }), below)
+            (Outcome::Skipped(SkippedNode { child_path, triangles, kept }), below)
         } else {
             let constants = self.options.constants.measure;
             let (surface, error) = self.stages.time(Stage::Measure, || {

@@ -20,10 +20,10 @@ pub struct KeptWhole {
     blocks: Vec<Vec<u32>>,
 }
 
-/// This stands for no block.
+/// Marks that there is no block.
 const NONE: u32 = u32::MAX;
 
-/// This is known of a body.
+/// Facts of a component.
 #[derive(Clone, Copy)]
 struct Body {
     place: CellBox,

@@ -43,7 +43,7 @@ impl Cell {
 /// A cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// This is the space that it fills.
+    /// The space that it fills.
     pub place: CellBox,
     /// `None`: it is a block.
     pub split: Option<Split>,

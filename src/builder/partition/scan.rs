@@ -28,7 +28,7 @@ impl Cluster {
     }
 }
 
-/// This is known of an input.
+/// Histogram of an input.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
     /// The box around its vertices.

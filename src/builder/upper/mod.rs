@@ -62,7 +62,7 @@ pub struct BlockTrees {
     pub trees: Vec<Tree<NodeRecord>>,
 }
 
-/// This builds nodes above blocks.
+/// Builds nodes above blocks.
 pub struct UpperBuilder<'a> {
     /// Options and output. The output folder has the files of the nodes below.
     pub target: Target<'a>,
@@ -72,17 +72,17 @@ pub struct UpperBuilder<'a> {
     pub up: UpAxis,
     /// The cells.
     pub partition: &'a Partition,
-    /// The blocks' vertices lie on it.
+    /// Lattice of the blocks' vertices.
     pub lattice: Lattice,
 }
 
-/// This is what a cell has become.
+/// The trees and the border of a cell.
 struct Built {
     trees: Vec<Tree<NodeRecord>>,
     border: RecordedBorder,
 }
 
-/// All cells add to these.
+/// Results that all cells add to.
 struct Gathered<'a> {
     blocks: Mutex<BTreeMap<u32, BlockTrees>>,
     textures: Mutex<&'a mut BTreeMap<String, SharedTexture>>,

@@ -6,7 +6,7 @@ use std::ops::Range;
 use rustc_hash::FxHashMap;
 
 use super::super::clean::CleanStats;
-use super::super::paged::PagedVec;
+use super::super::paged_vec::PagedVec;
 use super::super::vertices::{NONE, Pair, VertexDeduplicator};
 use super::statements::Statements;
 use crate::mesh::Triangulator;

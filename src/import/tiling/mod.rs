@@ -10,8 +10,8 @@
 //! Tiles depend on the file alone, not on memory.
 
 mod bodies;
+mod disk_vec;
 mod division;
-mod spilled;
 mod tile_text;
 
 use std::fs::File;
@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use self::bodies::Bodies;
+use self::disk_vec::DiskVec;
 use self::division::{Counts, Division};
-use self::spilled::DiskVec;
 use self::tile_text::{Belongs, FaceCorner, NONE, Names, TileReader, TileText};
 use super::clean::CleanStats;
 use super::find::{Kind, kind};

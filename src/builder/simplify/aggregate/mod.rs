@@ -9,9 +9,9 @@
 //! Those that go on beyond a border, and what is no body (the ground, roads, fences) stay as they
 //! are.
 
+mod appearance;
 mod extrudable;
 mod floors;
-mod look;
 mod prisms;
 
 use std::cell::OnceCell;
@@ -86,7 +86,7 @@ pub struct Components {
     rest: Vec<[u32; 3]>,
     /// The share of the mesh's area that bodies have.
     share: f64,
-    /// They are made for the first budget.
+    /// Footprints, computed for the first budget.
     footprints: OnceCell<Option<Footprints>>,
 }
 

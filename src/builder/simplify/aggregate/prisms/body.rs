@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::builder::constants::PrismConstants;
-use crate::builder::simplify::aggregate::look::{Appearance, AppearanceSum};
+use crate::builder::simplify::aggregate::appearance::{Appearance, AppearanceSum};
 use crate::mesh::{Coordinate, Mesh, UpAxis, wide};
 
 /// A separate body with walls and roofs, whichever way its faces wind.

@@ -24,7 +24,7 @@ use self::heights::{Grid, Heights, NONE};
 use self::outlines::Outlines;
 use self::regions::{Labels, Regions};
 use super::ComponentRules;
-use super::look::Appearance;
+use super::appearance::Appearance;
 use crate::builder::constants::PrismConstants;
 use crate::builder::simplify::parts::Part;
 use crate::mesh::{Mesh, Normal, UpAxis, wide};
