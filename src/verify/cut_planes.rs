@@ -77,13 +77,13 @@ pub(super) fn mark(
 }
 
 /// Pairs of leaves of which the one's box ends just where the other's begins along an axis, and the
-/// coordinate. Leaves that are flat along the axis are not cut across it.
+/// coordinate. A leaf that is flat along the axis, as of a wall that lies in the plane, must face the
+/// other: one that only passes it by was cut off elsewhere.
 fn touching_leaves(scene: &Scene, axis: usize) -> Vec<([u32; 2], f64)> {
     let node = |leaf: u32| &scene.nodes[leaf as usize];
     let is_flat = |leaf: u32| node(leaf).bbox_max[axis] <= node(leaf).bbox_min[axis];
     let begins = |leaf: u32| node(leaf).bbox_min[axis] + 0.0;
     let mut leaves = leaves(scene);
-    leaves.retain(|&leaf| !is_flat(leaf));
     leaves.sort_by(|&a, &b| begins(a).total_cmp(&begins(b)));
     // The sides at which they begin.
     let side = |&leaf: &u32| {
@@ -104,7 +104,21 @@ fn touching_leaves(scene: &Scene, axis: usize) -> Vec<([u32; 2], f64)> {
                 low <= bounds[1][at] && bounds[0][at] <= high
             })
         };
-        let mut found: Vec<usize> = sides.matching(touches).collect();
+        let faces = |b: u32| {
+            (0..3).filter(|&at| at != axis).all(|at| {
+                node(a).bbox_min[at] < node(b).bbox_max[at]
+                    && node(b).bbox_min[at] < node(a).bbox_max[at]
+            })
+        };
+        let is_apart = |&number: &usize| {
+            let b = leaves[number];
+            match (is_flat(a), is_flat(b)) {
+                (false, false) => true,
+                (true, true) => false,
+                _ => faces(b),
+            }
+        };
+        let mut found: Vec<usize> = sides.matching(touches).filter(is_apart).collect();
         found.sort_unstable();
         found.into_iter().map(|number| ([a, leaves[number]], end)).collect::<Vec<_>>()
     };
@@ -233,7 +247,12 @@ mod tests {
         };
         assert_eq!(changed(&|node| node.bbox_min[0] = 5.004), []);
         assert_eq!(changed(&|node| node.bbox_min[1] = 9.1), [], "passes it by");
-        assert_eq!(changed(&|node| node.bbox_max[0] = 5.0), [], "flat");
+        assert_eq!(changed(&|node| node.bbox_max[0] = 5.0), [([3, 4], 5.0)], "a wall in the plane");
+        let flat_beside = |node: &mut Node| {
+            node.bbox_max[0] = 5.0;
+            (node.bbox_min[1], node.bbox_max[1]) = (9.0, 12.0);
+        };
+        assert_eq!(changed(&flat_beside), [], "a wall that goes on from it");
 
         let upright = [[5.0, 0.0, 1.0], [5.0, 9.0, 1.0], [5.0, 9.0, 3.0]];
         let with_skirt = NodeGeometry {

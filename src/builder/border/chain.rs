@@ -200,7 +200,7 @@ impl<C: Coordinate> CutPlane<C> {
 }
 
 /// Splits the edge graph into runs of vertex indices between fixed vertices; loops are opened at
-/// their first vertex (in index order) and repeat it at the end.
+/// their first vertex (in index order) that some node has, as ends never go, and repeat it at the end.
 pub fn chains_of<C>(vertices: &[BorderVertex<C>], edges: &[[u32; 2]]) -> Vec<Vec<u32>> {
     let mut neighbours: Vec<Vec<(u32, u32)>> = vec![Vec::new(); vertices.len()];
     for (number, &[a, b]) in edges.iter().enumerate() {
@@ -228,11 +228,10 @@ pub fn chains_of<C>(vertices: &[BorderVertex<C>], edges: &[[u32; 2]]) -> Vec<Vec
         }
     };
     // Runs that begin at a fixed vertex first, then what is left are loops.
-    for only_ends in [true, false] {
-        for vertex in 0..vertices.len() as u32 {
-            if only_ends && !ends(vertex) {
-                continue;
-            }
+    let is_there = |vertex: u32| !vertices[vertex as usize].gone;
+    let starts: [&dyn Fn(u32) -> bool; 3] = [&ends, &is_there, &|_| true];
+    for is_start in starts {
+        for vertex in (0..vertices.len() as u32).filter(|&vertex| is_start(vertex)) {
             for &first in &neighbours[vertex as usize] {
                 if !used[first.1 as usize] {
                     runs.push(follow(vertex, first, &mut used));
@@ -302,6 +301,17 @@ mod tests {
         assert_eq!(count(1), 2 + 20);
         assert_eq!(count(2), 2 + 60);
         assert_eq!(count(3), 200);
+    }
+
+    #[test]
+    fn a_loop_is_opened_where_some_node_has_a_vertex() {
+        let mut square =
+            vertices(&[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]]);
+        square[0].gone = true;
+        let edges = [[0, 1], [1, 2], [2, 3], [3, 0]];
+        let plane = CutPlane::new(0, 0.0, &square, &edges, &rule(&[1.0, 1.0]));
+        let levels: Vec<_> = square.iter().map(|at| plane.keep_level(at.position)).collect();
+        assert_eq!(levels, [Some(2), Some(1), Some(1), Some(1)], "no node keeps what none has");
     }
 
     #[test]
