@@ -45,14 +45,18 @@ pub(super) fn mark(
             }
         }
     };
+    let middles: Vec<DVec3> = geometry.par_iter().map(middle_of).collect();
     for seams in seams {
         let mut pairs: BTreeMap<[u32; 2], Vec<&Seam>> = BTreeMap::new();
         for seam in seams {
             pairs.entry(seam.leaves).or_default().push(seam);
         }
         for ([a, b], seams) in pairs {
-            let nodes = [a, b].map(|leaf| &scene.nodes[leaf as usize]);
-            if let Some(plane) = plane_between(&seams, nodes, steps[a as usize]) {
+            let sides = [a, b].map(|leaf| LeafSide {
+                node: &scene.nodes[leaf as usize],
+                middle: middles[leaf as usize],
+            });
+            if let Some(plane) = plane_between(&seams, sides, steps[a as usize]) {
                 part([a, b], plane);
             }
         }
@@ -136,11 +140,32 @@ fn lies_in(corners: [DVec3; 3], &(axis, bits): &Plane, step: f64) -> bool {
         && corners.iter().all(|corner| (corner[axis] - coordinate).abs() <= beside)
 }
 
-/// The plane that holds most of the edges between two leaves and separates their boxes' middles.
-fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<Plane> {
+/// A leaf beside a plane.
+#[derive(Clone, Copy)]
+struct LeafSide<'a> {
+    node: &'a Node,
+    /// The middle of its surface.
+    middle: DVec3,
+}
+
+/// The mean of a node's surface. The middle of its box would say little where a single body reaches far
+/// beyond the plane.
+fn middle_of(geometry: &NodeGeometry) -> DVec3 {
+    let (mut sum, mut area) = (DVec3::ZERO, 0.0);
+    for &triangle in &geometry.triangles {
+        let corners = geometry.corners(triangle);
+        let own = cross(corners).length();
+        sum += corners.into_iter().sum::<DVec3>() / 3.0 * own;
+        area += own;
+    }
+    if area > 0.0 { sum / area } else { DVec3::NAN }
+}
+
+/// The plane that holds most of the edges between two leaves and separates the middles of their surfaces.
+fn plane_between(seams: &[&Seam], [a, b]: [LeafSide; 2], step: f64) -> Option<Plane> {
     let mut best: Option<(f64, Plane)> = None;
     for axis in 0..3 {
-        let middle = |node: &Node| (node.bbox_min[axis] + node.bbox_max[axis]) * 0.5;
+        let middle = |leaf: LeafSide| leaf.middle[axis];
         let (low, high) = if middle(a) <= middle(b) { (a, b) } else { (b, a) };
         let mut counts: BTreeMap<u64, usize> = BTreeMap::new();
         for seam in seams {
@@ -153,10 +178,10 @@ fn plane_between(seams: &[&Seam], [a, b]: [&Node; 2], step: f64) -> Option<Plane
             continue;
         };
         // Vertices near the plane count as on it, so a few edges lie beside it, and small bodies
-        // are not cut at all: boxes may overlap, but each has its middle on its own side. Leaves
+        // are not cut at all: boxes may overlap, but most of each surface is on its own side. Leaves
         // that are flat along the axis are not cut across it.
         let coordinate = f64::from_bits(bits);
-        let side = |node: &Node| node.bbox_max[axis] - node.bbox_min[axis];
+        let side = |leaf: LeafSide| leaf.node.bbox_max[axis] - leaf.node.bbox_min[axis];
         let slack = 4.0 * step + BESIDE * side(a).min(side(b));
         let between = middle(low) < coordinate - slack && middle(high) > coordinate + slack;
         let apart = middle(high) - middle(low);
@@ -188,10 +213,29 @@ mod tests {
         let seams =
             [seam([5.0, 0.0, 0.0], [5.0, 4.0, 0.0]), seam([5.0, 4.0, 0.0], [5.0, 9.0, 0.0])];
         let seams: Vec<&Seam> = seams.iter().collect();
-        let found = plane_between(&seams, [&flat[0], &flat[1]], 1e-6);
+        let sides = |[a, b]: [f64; 2]| {
+            let side = |node, x| LeafSide { node, middle: DVec3::new(x, 4.5, 0.0) };
+            [side(&flat[0], a), side(&flat[1], b)]
+        };
+        let found = plane_between(&seams, sides([2.5, 8.0]), 1e-6);
         assert_eq!(found, Some((0, 5f64.to_bits())), "not z = 0, where all is");
         let beside = seam([5.01, 0.0, 0.0], [5.02, 4.0, 1.0]);
-        assert_eq!(plane_between(&[&beside], [&flat[0], &flat[1]], 1e-6), None);
+        assert_eq!(plane_between(&[&beside], sides([2.5, 8.0]), 1e-6), None);
+        assert_eq!(plane_between(&seams, sides([6.0, 8.0]), 1e-6), None, "both beyond it");
+    }
+
+    #[test]
+    fn the_middle_of_a_surface_is_where_most_of_it_is() {
+        let square = |x: f32, side: f32| {
+            [[x, 0.0, 0.0], [x + side, 0.0, 0.0], [x + side, side, 0.0], [x, side, 0.0]]
+        };
+        let geometry = NodeGeometry {
+            positions: [square(0.0, 4.0), square(20.0, 1.0)].concat(),
+            triangles: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]],
+            ..NodeGeometry::default()
+        };
+        let middle = middle_of(&geometry);
+        assert!((middle.x - (2.0 * 16.0 + 20.5) / 17.0).abs() < 1e-9, "{middle}");
     }
 
     /// Leaves in one square layer, side by side.
