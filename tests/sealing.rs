@@ -18,7 +18,7 @@ use hlod::builder::border::skirt;
 use hlod::builder::hierarchy::{BorderMode, HierarchyOptions};
 use hlod::builder::simplify::ladder::Simplifier;
 use hlod::lattice::Lattice;
-use hlod::mesh::{Material, Mesh, PositionKey};
+use hlod::mesh::{AlphaMode, Material, Mesh, PositionKey};
 use hlod::texture::{BakeClasses, BakePlan, BakeReason};
 
 /// Rays at each front.
@@ -279,11 +279,16 @@ fn collapse_options() -> Vec<HierarchyOptions> {
 fn all_baked(materials: usize) -> BakeClasses {
     let materials: Vec<Material> =
         (0..materials).map(|number| Material::plain(number.to_string())).collect();
-    BakeClasses::new(&materials, |_| true)
+    BakeClasses::new(&materials, |_| true, |_| true)
 }
 
 fn always(classes: &BakeClasses) -> Option<BakePlan<'_>> {
-    Some(BakePlan { classes, always: Some(BakeReason::Torn) })
+    Some(BakePlan {
+        classes,
+        always: Some(BakeReason::Torn),
+        where_over_budget: true,
+        textures: None,
+    })
 }
 
 #[test]
@@ -313,8 +318,9 @@ fn skirts_cover_a_ball_whose_coarse_nodes_have_textures_of_their_own() {
         skirts_cover(solid, 40.0, &collapse_options(), always(&all_baked(materials as usize)));
     }
     // Of three materials one keeps its own texture, and seams around it.
-    let materials: Vec<Material> = ["a", "b", "c"].map(Material::plain).to_vec();
-    let classes = BakeClasses::new(&materials, |material| material > 0);
+    let mut materials = ["a", "b", "c"].map(Material::plain);
+    materials[0].alpha = AlphaMode::Mask { cutoff: 0.5 };
+    let classes = BakeClasses::new(&materials, |_| true, |_| true);
     let solid = in_charts(&ball(36, 5.0, 0.03, 31), 2.5, 3);
     skirts_cover(solid, 40.0, &collapse_options(), always(&classes));
 }

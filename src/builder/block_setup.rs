@@ -1,5 +1,7 @@
 //! Prepares building nodes from a chunk of a model: of a block, or of a node above blocks.
 
+use std::collections::BTreeMap;
+
 use crate::builder::emit::disk_sink::DiskSink;
 use crate::builder::hierarchy::{BlockBuilder, HierarchyOptions, Resolutions};
 use crate::builder::options::BuildOptions;
@@ -9,7 +11,7 @@ use crate::builder::simplify::orient::reorientable;
 use crate::builder::stages::{Stage, Stages};
 use crate::format::{Encoding, OutputDir};
 use crate::lattice::Lattice;
-use crate::mesh::{Mesh, Model, Part, UpAxis};
+use crate::mesh::{AlphaMode, Material, Mesh, Model, Part, UpAxis};
 use crate::texture::{
     BakeClasses, BlockTextures, SharedTextures, TextureCache, TextureOptions, TexturePlan,
     TextureUse, texture_factors,
@@ -35,8 +37,8 @@ pub struct Target<'a> {
 pub struct Appearances {
     /// Which textures are cut up.
     pub textures: TexturePlan,
-    /// Which materials may lose their seams.
-    pub classes: BakeClasses,
+    /// By material: see [`Self::kinds`].
+    kinds: Vec<Option<u32>>,
     /// Which materials prisms may have.
     pub extrudable: Extrudable,
 }
@@ -49,23 +51,36 @@ impl Appearances {
 
     /// Decides for the materials of a model; `textures` says how its textures are used.
     pub fn of(model: &Model, textures: TexturePlan) -> Self {
-        let is_cut_up = |material: u32| {
-            let texture = textures.texture_of(material);
-            texture.map(|texture| textures.texture_use(texture)) == Some(TextureUse::Atlas)
-        };
-        let classes = BakeClasses::new(&model.materials, is_cut_up);
         let is_textured = |material: u32| textures.texture_of(material).is_some();
+        let classes = BakeClasses::new(&model.materials, is_textured, |_| true);
         let extrudable = Extrudable::new(model.materials.len(), is_textured, &classes);
-        Self { textures, classes, extrudable }
+        let kinds = kinds(&model.materials, &textures);
+        Self { textures, kinds, extrudable }
     }
 
     /// Of each part the material that stands for what it looks like; `None` where its colours may not
     /// leave its triangles.
     pub fn kinds(&self, parts: &[Part]) -> Vec<Option<u32>> {
-        let is_plain = |&material: &u32| self.textures.texture_of(material).is_none();
-        let plain = |part: &Part| Some(part.material).filter(is_plain);
-        parts.iter().map(|part| self.classes.of(part.material).or_else(|| plain(part))).collect()
+        let kind = |part: &Part| self.kinds.get(part.material as usize).copied().flatten();
+        parts.iter().map(kind).collect()
     }
+}
+
+/// By material, the first that differs from it in nothing but an image that is cut up. `None` of images that
+/// repeat, and of cut-outs.
+fn kinds(materials: &[Material], textures: &TexturePlan) -> Vec<Option<u32>> {
+    let mut first_alike = BTreeMap::new();
+    let kind = |(number, material): (u32, &Material)| {
+        let Some(texture) = textures.texture_of(number) else { return Some(number) };
+        let is_cut_up = textures.texture_use(texture) == TextureUse::Atlas;
+        if material.alpha != AlphaMode::Opaque || !is_cut_up {
+            return None;
+        }
+        // Zeros of either sign are one colour.
+        let color = material.base_color.map(|part| (part + 0.0).to_bits());
+        Some(*first_alike.entry((color, material.double_sided)).or_insert(number))
+    };
+    (0..).zip(materials).map(kind).collect()
 }
 
 /// Where a block is, and what its files are called.

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rustc_hash::FxHashMap;
 
+use super::level::{self, LevelImage, Region};
 use super::plan::TexturePlan;
 use crate::decode::{self, DecodedTexture};
 use crate::mesh::{Model, TextureData, TextureSource, Warnings};
@@ -16,11 +17,23 @@ use crate::mesh::{Model, TextureData, TextureSource, Warnings};
 pub(crate) struct Decoded {
     pub image: Arc<DecodedTexture>,
     hash: OnceLock<blake3::Hash>,
+    pyramid: OnceLock<Vec<LevelImage>>,
 }
 
 impl Decoded {
     pub fn new(image: DecodedTexture) -> Self {
-        Self { image: Arc::new(image), hash: OnceLock::new() }
+        Self { image: Arc::new(image), hash: OnceLock::new(), pyramid: OnceLock::new() }
+    }
+
+    /// The whole image and its halves down to a single texel, which comes first.
+    pub fn pyramid(&self) -> &[LevelImage] {
+        self.pyramid.get_or_init(|| {
+            let size = [self.image.width, self.image.height].map(|side| side as usize);
+            let halvings = usize::BITS - size[0].max(size[1]).leading_zeros();
+            let steps: Vec<f64> = (0..halvings).rev().map(|power| f64::from(1 << power)).collect();
+            let region = Region { origin: [0; 2], size, covered: None };
+            level::level_images(Arc::clone(&self.image), &region, &steps)
+        })
     }
 
     /// Of the texels and the size, so that equal images of different inputs are one.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec2, Vec4};
+use glam::{DVec2, DVec3, Vec3, Vec4};
 
 use super::bits::BitGrid;
 use super::fill::{self, Texels};
@@ -73,6 +73,30 @@ impl Sampler<'_> {
         upper + (lower - upper) * down
     }
 
+    /// The same of an image that goes on at its other side along the axes where it `repeats`, for a
+    /// position inside of it.
+    pub fn at_repeating(&self, at: DVec2, repeats: [bool; 2]) -> Vec4 {
+        // Two texels, and the share of the second.
+        let pair = |axis: usize| {
+            let (size, low) = (self.size[axis], at[axis] - 0.5);
+            if !repeats[axis] {
+                let low = low.clamp(0.0, self.last[axis]);
+                let first = low as usize;
+                return (first, (first + 1).min(size - 1), (low - first as f64) as f32);
+            }
+            let second = (low.floor() + 1.0) as usize % size;
+            ((second + size - 1) % size, second, (low - low.floor()) as f32)
+        };
+        let ((left, right, along), (top, bottom, down)) = (pair(0), pair(1));
+        let mix = |row: usize| {
+            let texel = |column: usize| self.texel(row * self.row + column * self.channels);
+            let (one, other) = (texel(left), texel(right));
+            one + (other - one) * along
+        };
+        let (upper, lower) = (mix(top), mix(bottom));
+        upper + (lower - upper) * down
+    }
+
     /// The mean of the square of two by two texels around a position, linear light, 0–1, and 1;
     /// beyond the image its border texels go on.
     #[inline]
@@ -140,6 +164,20 @@ impl LevelImage {
             last: DVec2::from(self.size.map(|side| side as f64 - 1.0)),
             light: color::byte_to_light(),
         }
+    }
+
+    /// The mean colour, linear light, 0–1.
+    pub fn mean(&self) -> Vec3 {
+        let light = color::byte_to_light();
+        let [width, height] = self.size;
+        let mut sum = DVec3::ZERO;
+        for y in 0..height {
+            for texel in self.row(y, 0, width).chunks_exact(self.channels) {
+                let of = |channel: usize| light[usize::from(texel[channel])];
+                sum += Vec3::new(of(0), of(1), of(2)).as_dvec3();
+            }
+        }
+        (sum / (width * height) as f64).as_vec3()
     }
 
     /// The same at half the resolution.
@@ -479,6 +517,23 @@ mod tests {
             let found = level.sampler().mean_at(at);
             assert!((f64::from(found.x) - mean.x).abs() < 1e-4, "{at} {found} {mean}");
             assert!((f64::from(found.z) - mean.y).abs() < 1e-4, "{at} {found} {mean}");
+        }
+    }
+
+    #[test]
+    fn an_image_that_repeats_goes_on_at_its_other_side() {
+        let source = image(5, 4, 3);
+        let region = Region { origin: [0; 2], size: [5, 4], covered: None };
+        let level = &level_images(Arc::clone(&source), &region, &[1.0])[0];
+        let around = Region { origin: [-1, -1], size: [7, 6], covered: None };
+        let around = &level_images(source, &around, &[1.0])[0];
+        for (x, y) in (0..20).flat_map(|y| (0..25).map(move |x| (x, y))) {
+            let at = DVec2::new(f64::from(x), f64::from(y)) * 0.2 + 0.01;
+            let found = level.sampler().at_repeating(at, [true; 2]);
+            let expected = around.sampler().at(at + 1.0);
+            assert!((found - expected).abs().max_element() < 1e-6, "{at}: {found} {expected}");
+            let clamped = level.sampler().at_repeating(at, [false; 2]);
+            assert!((clamped - level.sampler().at(at)).abs().max_element() < 1e-6, "{at}");
         }
     }
 

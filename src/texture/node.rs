@@ -4,6 +4,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use super::atlas::{Atlas, AtlasImage, AtlasInput, Page, PatchPlacement};
 use super::bake::BakedMesh;
@@ -191,6 +192,8 @@ pub(super) struct NodeBuilder<'a> {
     pub(super) mesh: &'a Mesh,
     /// Where it is, the triangles of its charts take their texels from it.
     baked: Option<&'a BakedMesh>,
+    /// The images of baked charts.
+    pub(super) baked_images: Range<usize>,
     pub(super) level: usize,
     /// The last triangles of the mesh.
     pub(super) skirts: &'a AppendedSkirts,
@@ -219,6 +222,7 @@ impl<'a> NodeBuilder<'a> {
             block,
             mesh,
             baked: None,
+            baked_images: 0..0,
             level: block.nearest_level(level),
             skirts,
             charts: Charts::default(),
@@ -308,7 +312,10 @@ impl<'a> NodeBuilder<'a> {
             if let Some(atlas) = sheet.build(if is_least { usize::MAX } else { 1 }) {
                 let mut mappings = vec![None; first as usize];
                 mappings.resize(self.charts.boxes.len(), Some(mapping));
-                return self.take_atlas(&atlas, &mappings, &members, 3);
+                let first = self.images.len();
+                self.take_atlas(&atlas, &mappings, &members, 3)?;
+                self.baked_images = first..self.images.len();
+                return Ok(());
             }
             if is_least {
                 let side = self.max_side();

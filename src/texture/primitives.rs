@@ -192,6 +192,10 @@ impl NodeBuilder<'_> {
     /// Vertex colours, where there must be some, and the factor of all of them.
     fn colors(&self, group: &Group) -> (Vec<[u16; 4]>, [f32; 4]) {
         let mesh = self.mesh;
+        // Baked texels have them.
+        if group.image.is_some_and(|image| self.baked_images.contains(&image)) {
+            return (Vec::new(), [1.0; 4]);
+        }
         let factors: Vec<[f32; 4]> = group.materials.iter().map(|m| self.base_color(*m)).collect();
         let base = factors.first().copied().unwrap_or([1.0; 4]);
         let uniform = factors.iter().all(|factor| *factor == base);

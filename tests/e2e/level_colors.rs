@@ -4,9 +4,11 @@ use std::fmt::Write;
 
 use hlod::builder::hierarchy::HierarchyOptions;
 use hlod::builder::progress::Silent;
-use hlod::builder::{BuildOptions, build};
-use hlod::format::Scene;
+use hlod::builder::{BuildOptions, Outcome, build};
+use hlod::format::{Scene, read_glb};
+use hlod::texture::BakeReason;
 
+use crate::support::hlod_build;
 use crate::support::inputs::write;
 use crate::verify::{Broken, failed};
 
@@ -94,4 +96,58 @@ fn a_level_in_the_right_materials_passes_and_one_in_the_wrong_ones_does_not() {
     let swapped = painted(|color| if is_grass(color) { ASPHALT } else { GRASS });
     assert_eq!(failed(&swapped), ["colours of the levels"]);
     assert!(share(&swapped) > 0.9, "{}", share(&swapped));
+}
+
+/// A track of asphalt, twelve quads wide, that winds over grass, `side` by `side` quads of 1 m; both textures repeat.
+fn write_winding_track(folder: &std::path::Path, side: usize) -> std::path::PathBuf {
+    for (name, color) in [("grass", [80u8, 180, 50]), ("asphalt", [60, 60, 65])] {
+        let image = image::RgbImage::from_fn(16, 16, |x, y| {
+            image::Rgb(color.map(|part| part + ((x * 5 + y * 3) % 7) as u8))
+        });
+        image.save(folder.join(format!("{name}.png"))).unwrap();
+    }
+    let mtl = "newmtl grass\nmap_Kd grass.png\nnewmtl asphalt\nmap_Kd asphalt.png\n";
+    write(folder, "winding.mtl", mtl);
+    let mut text = String::from("mtllib winding.mtl\n");
+    for i in 0..=side {
+        for j in 0..=side {
+            let height = ((i * 7 + j * 13) % 5) as f64 * 0.02;
+            let _ = writeln!(text, "v {i} {j} {height}\nvt {i} {j}");
+        }
+    }
+    let middle = |i: usize| side as f64 * (0.5 + 0.4 * (i as f64 * 0.2).sin());
+    for i in 0..side {
+        for j in 0..side {
+            let is_track = (j as f64 + 0.5 - middle(i)).abs() < 6.0;
+            let _ = writeln!(text, "usemtl {}", if is_track { "asphalt" } else { "grass" });
+            let at = |i: usize, j: usize| i * (side + 1) + j + 1;
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            let _ = writeln!(text, "f {a}/{a} {b}/{b} {c}/{c} {d}/{d}");
+        }
+    }
+    write(folder, "winding.obj", text)
+}
+
+#[test]
+fn nodes_that_would_lose_a_track_show_it_in_textures_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = write_winding_track(folder.path(), 120);
+    let out = tempfile::tempdir().unwrap();
+    let hierarchy = HierarchyOptions { desired_tris: 30, ..HierarchyOptions::default() };
+    let options = BuildOptions { hierarchy, ..BuildOptions::default() };
+    let outcome = build(std::slice::from_ref(&input), out.path(), &options, &Silent).unwrap();
+    let Outcome::Built(report) = outcome else { panic!("nothing was there") };
+    assert!(report.baked.iter().any(|node| node.reason == BakeReason::Colors));
+    let scene = Scene::read(out.path()).unwrap();
+    let root = scene.nodes.iter().find(|node| node.parent.is_none()).unwrap();
+    let bytes = std::fs::read(out.path().join("nodes").join(&*root.file)).unwrap();
+    let mesh = read_glb(&bytes, out.path()).unwrap();
+    assert_eq!((mesh.primitives.len(), mesh.images.len()), (1, 1), "one draw");
+    assert!(mesh.images[0].repeating().is_none());
+    let source = input.to_str().unwrap();
+    hlod_build()
+        .args(["verify", "--quiet", "--samples", "20000"])
+        .args([out.path().to_str().unwrap(), "--source", source])
+        .assert()
+        .success();
 }

@@ -171,8 +171,12 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             });
             let on_border = |&&planes: &&u64| planes & node.path.bits() != 0;
             // Of what is written alone: parents take their colours from the original, too.
-            let painted =
-                self.stages.time(Stage::Simplify, || with_face_colors(&mesh, &skirts, &original));
+            // A baked texture has its colours.
+            let face_colors = || with_face_colors(&mesh, &skirts, &original);
+            let painted = match reason {
+                None => self.stages.time(Stage::Simplify, face_colors),
+                Some(_) => None,
+            };
             let (drawn, skirts) = match &painted {
                 Some((painted, skirts)) => (painted, skirts),
                 None => (&mesh, &skirts),
@@ -246,10 +250,11 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         if reason.is_none() {
             let within_seams = ladder(mesh, border.clone(), false);
             let coarse = self.simplified(&within_seams, node, node.budget);
-            if coarse.simplified.step == LadderStep::Collapse {
+            let Simplified { mesh, step, .. } = &coarse.simplified;
+            reason = plan.reason(mesh, *step == LadderStep::Collapse);
+            if reason.is_none() {
                 return (within_seams, Some(coarse), None);
             }
-            reason = Some(BakeReason::Seams);
         }
         let (mesh, border) = weld_seams(mesh, border, plan.classes);
         (ladder(&mesh, border, true), None, reason)

@@ -7,7 +7,7 @@
 use rustc_hash::FxHashMap;
 
 use crate::builder::border::vertex::Border;
-use crate::mesh::{Mesh, PositionKey, all_differ, key};
+use crate::mesh::{Mesh, Normal, PositionKey, all_differ, key};
 use crate::texture::BakeClasses;
 
 /// Joins the vertices of each class that lie at one place.
@@ -34,6 +34,9 @@ pub fn weld_seams(mesh: &Mesh, border: &Border, classes: &BakeClasses) -> (Mesh,
         if let Some(texcoord) = result.texcoords.get_mut(index as usize) {
             *texcoord = [0.0; 2];
         }
+        if let Some(normal) = result.normals.get_mut(index as usize) {
+            *normal = Normal::NONE;
+        }
         if let Some(color) = result.colors.get_mut(index as usize) {
             *color = [u16::MAX; 4];
         }
@@ -53,7 +56,7 @@ mod tests {
     fn vertices_of_a_class_at_one_place_become_one() {
         let materials = ["a", "b", "c"].map(Material::plain);
         // The first two may be baked.
-        let classes = BakeClasses::new(&materials, |material| material < 2);
+        let classes = BakeClasses::new(&materials, |_| true, |material| material < 2);
         let mesh = Mesh {
             positions: vec![
                 [0.0; 3],

@@ -10,18 +10,24 @@
 mod baked_mesh;
 mod chart_plane;
 pub(super) mod classes;
+mod density;
 mod facet;
 mod flat;
+mod light_votes;
 mod nearby;
 mod paint;
+#[cfg(test)]
+mod patchwork_tests;
 pub(super) mod plan;
 mod planar;
 mod project;
 mod shading;
 pub(super) mod source;
+mod source_image;
 #[cfg(test)]
 mod tests;
 mod tile;
+mod wrong_colors;
 
 pub use baked_mesh::BakedMesh;
 pub use classes::BakeClasses;

@@ -103,12 +103,12 @@ impl BlockTextures<'_> {
         nearby.density(mesh, triangles).sqrt() / self.steps[level]
     }
 
-    /// What the charts' scales are multiplied with so that with their gutters they take no more
-    /// than the node's share.
-    pub(super) fn fitted(&self, mesh: &Mesh, charts: &[FlatChart], level: usize) -> f64 {
+    /// What the scales of charts, of so many square metres on the node, are multiplied with so that with
+    /// their gutters they take no more than the node's share.
+    pub(super) fn fitted(&self, area: f64, charts: &[FlatChart], level: usize) -> f64 {
         let cell = self.baked_cell(level);
         let part = if level == 0 { 1.0 } else { CELLS };
-        let share = (self.share_of(mesh, level) * part).max((cell * cell) as f64 * 4.0);
+        let share = (self.bake_share(area, level) * part).max((cell * cell) as f64 * 4.0);
         let longest = charts.iter().map(|chart| chart.size.max_element() * chart.scale);
         let most = (self.options.max_atlas as f64 * 0.5).max(1.0);
         let mut factor = (most / longest.fold(most, f64::max)).min(1.0);
@@ -148,8 +148,6 @@ impl BlockTextures<'_> {
         let owners = owners(&corners, size);
         let mut pixels = vec![0u8; width * height * 3];
         let mut known = BitGrid::new(width, height);
-        // Bilinear sampling of the next finer level averages just the texel's own width.
-        let finer = (level + 1).min(self.steps.len() - 1);
         let triangles = nearby.triangles(mesh, &chart.triangles);
         let Sampling { side: samples, wide } = self.sampling(scale / chart.scale, level, triangles);
         let plane = chart.plane.of_texels(scale, margin(cell)).of_samples(samples);
@@ -191,7 +189,7 @@ impl BlockTextures<'_> {
                         let [a, b, c] = corners;
                         let normal = (b - a).cross(c - a).normalize_or_zero();
                         near = source.nearest(point, normal, near, SLACK / scale).or(near);
-                        Some(self.color_at(source, near?, finer))
+                        Some(self.color_at(source, near?, scale))
                     };
                     let drawn = (sum.w > 0.0).then(|| sum.truncate() / sum.w);
                     let Some(color) = drawn.or_else(&mut searched) else { continue };
@@ -215,16 +213,23 @@ impl BlockTextures<'_> {
         Sampling { side, wide: side < most }
     }
 
-    /// What the original shows at a point, at the level's resolution, linear light, 0–1.
-    fn color_at(&self, source: &BakeSource, point: SurfacePoint, level: usize) -> Vec3 {
+    /// What the original shows at a point, with `scale` texels a metre, linear light, 0–1.
+    fn color_at(&self, source: &BakeSource, point: SurfacePoint, scale: f64) -> Vec3 {
         let triangle = source.triangle(point.triangle);
-        let Some(levels) = self.levels_of(triangle) else { return Vec3::ONE };
-        let image = &levels[level];
-        let along = |axis: usize| {
-            (0..3).map(|i| point.weights[i] * f64::from(triangle.texels[i][axis])).sum::<f64>()
-        };
-        let light = image.sampler().at(DVec2::new(along(0), along(1)) / image.step);
-        (light * tint(triangle.colors, || point.weights)).truncate()
+        let sampler = self.image_of(triangle).and_then(|image| {
+            let area = triangle.area.max(f64::MIN_POSITIVE);
+            let width = (triangle.texel_area() / area).sqrt() / scale;
+            // Bilinear sampling averages about two texels along each axis.
+            image.level(width * 0.5)
+        });
+        let light = sampler.map_or(Vec4::ONE, |sampler| {
+            let along = |axis: usize| {
+                (0..3).map(|i| point.weights[i] * f64::from(triangle.texels[i][axis])).sum::<f64>()
+            };
+            sampler.at(DVec2::new(along(0), along(1)) / sampler.step)
+        });
+        (light * self.factor_of(triangle.material) * tint(triangle.colors, || point.weights))
+            .truncate()
     }
 }
 

@@ -269,6 +269,7 @@ mod tests {
     use crate::mesh::{Material, Mesh};
     use crate::random::Random;
     use crate::texture::bake::BakeClasses;
+    use crate::texture::bake::source::{ImageKind, TriangleTexels};
 
     /// Those of the original.
     const TRIANGLES: u32 = 100;
@@ -287,8 +288,11 @@ mod tests {
             }
             mesh.triangles.push([first, first + 1, first + 2]);
         }
-        let classes = BakeClasses::new(&[Material::plain("any")], |_| true);
-        BakeSource::new(&mesh, &classes, |_| Some((0, 0, [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]])))
+        let classes = BakeClasses::new(&[Material::plain("any")], |_| true, |_| true);
+        let texels = [[0.0, 0.0], [100.0, 0.0], [0.0, 100.0]];
+        BakeSource::new(&mesh, &classes, |_| {
+            Some(TriangleTexels { chart: 0, texels, image: ImageKind::CutUp })
+        })
     }
 
     /// Weights of the corners where the line through a point along a normal meets a triangle's

@@ -3,10 +3,10 @@
 use glam::{DVec2, Vec4};
 
 use super::project::{Projection, SampleHit};
-use super::source::{BakeSource, SourceTriangle};
+use super::source::BakeSource;
+use super::source_image::WrappedSampler;
 use super::tile::Tile;
-use crate::texture::block::{BlockTextures, Prepared};
-use crate::texture::level::{LevelImage, Sampler};
+use crate::texture::block::BlockTextures;
 
 /// What samples show is taken from a level whose texels are at most so large for them: bilinear
 /// sampling averages about two of them along each axis.
@@ -15,16 +15,6 @@ const NARROWER: f64 = 0.6;
 /// Where wide samples have so many texels between them, two by two of these are averaged; fewer are
 /// magnified.
 const WIDE: f64 = 1.5;
-
-impl BlockTextures<'_> {
-    /// The images of a triangle of the original, by level; `None` where it has no texture.
-    pub(super) fn levels_of(&self, triangle: &SourceTriangle) -> Option<&[LevelImage]> {
-        match self.textures.get(triangle.texture as usize) {
-            Some(Prepared::Atlas(atlas)) => Some(&atlas.levels),
-            _ => None,
-        }
-    }
-}
 
 /// What the samples of a tile show.
 pub(super) struct Samples<'a> {
@@ -39,7 +29,9 @@ pub(super) struct Samples<'a> {
 /// What gives samples of one triangle of the original their colours.
 struct Shading<'a> {
     /// `None` where the triangle has no texture.
-    sampler: Option<Sampler<'a>>,
+    sampler: Option<WrappedSampler<'a>>,
+    /// Of its material.
+    factor: Vec4,
     /// The position in its image of the origin of the chart, and by column and row.
     texels: [DVec2; 3],
     /// Samples far enough inside its chart are means of two by two texels.
@@ -120,12 +112,12 @@ impl<'a> Shading<'a> {
         wide: bool,
     ) -> Self {
         let triangle = source.triangle(shown.triangle);
-        let narrow = |level: &&LevelImage| level.step <= shown.spacing * NARROWER;
-        let levels = block.levels_of(triangle);
-        let image = levels.and_then(|levels| levels.iter().find(narrow).or(levels.last()));
-        let step = image.map_or(1.0, |image| image.step);
+        let image = block.image_of(triangle);
+        let sampler = image.and_then(|image| image.level(shown.spacing * NARROWER));
+        let step = sampler.as_ref().map_or(1.0, |sampler| sampler.step);
         Self {
-            sampler: image.map(LevelImage::sampler),
+            sampler,
+            factor: block.factor_of(triangle.material),
             texels: shown.texels(1.0 / step),
             wide: wide && shown.spacing >= step * WIDE,
             shown,
@@ -136,11 +128,12 @@ impl<'a> Shading<'a> {
     /// The colour at a sample's centre, linear light, 0–1, and 1.
     #[inline]
     fn at(&self, centre: DVec2, wide: bool) -> Vec4 {
-        let Some(sampler) = &self.sampler else { return Vec4::ONE };
-        let [origin, right, down] = self.texels;
-        let at = origin + right * centre.x + down * centre.y;
-        let light = if wide { sampler.mean_at(at) } else { sampler.at(at) };
-        light * tint(self.colors, || self.shown.weights(centre))
+        let light = self.sampler.as_ref().map_or(Vec4::ONE, |sampler| {
+            let [origin, right, down] = self.texels;
+            let at = origin + right * centre.x + down * centre.y;
+            if wide { sampler.mean_at(at) } else { sampler.at(at) }
+        });
+        light * self.factor * tint(self.colors, || self.shown.weights(centre))
     }
 }
 

@@ -3,7 +3,9 @@
 use glam::{DVec2, DVec3};
 
 use super::classes::BakeClasses;
+use super::density;
 use crate::mesh::{Mesh, Surface, wide};
+use crate::texture::charts::NO_CHART;
 
 /// A triangle of the original that faces away from where a texel looks counts as so many times as
 /// far: of the two sides of a thin wall each texel finds its own.
@@ -16,11 +18,14 @@ const ASIDE: f64 = 0.25;
 /// A triangle of the original faces a surface's way where their normals' cosine is at least this.
 const ALONG: f64 = 0.5;
 
-/// Textured triangles of a block at full detail, with their texels.
+/// Opaque triangles of a block at full detail, with what they show.
 #[derive(Debug)]
 pub(crate) struct BakeSource {
     surface: Surface,
     triangles: Vec<SourceTriangle>,
+    repeating_texels: f64,
+    /// Square metres of what is not lit.
+    unlit_area: f64,
 }
 
 /// What a triangle of the original shows.
@@ -28,16 +33,52 @@ pub(crate) struct BakeSource {
 pub(crate) struct SourceTriangle {
     /// Unit length.
     pub normal: DVec3,
-    /// Texture of the model.
-    pub texture: u32,
+    /// Square metres.
+    pub area: f64,
+    /// Material of the model.
+    pub material: u32,
+    /// It is shown with light.
+    pub is_lit: bool,
+    /// What its texels are of.
+    pub image: ImageKind,
     /// Triangles of one chart lie beside each other in the image as they do in space.
     pub chart: u32,
-    /// Positions of the corners in the part of the image that the block uses, source texels.
+    /// Positions of the corners in the part of the image that the block uses, source texels. All at 0
+    /// where there is no image.
     pub texels: [[f32; 2]; 3],
     /// Vertex colours of the corners.
     pub colors: Option<[[u16; 4]; 3]>,
-    /// Source texels in a square metre.
+    /// Texels in a square metre that it deserves at full detail.
     pub density: f64,
+}
+
+/// The kind of image that a triangle of the original shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum ImageKind {
+    /// No image.
+    #[default]
+    Plain,
+    /// Its texels are shown about once.
+    CutUp,
+    /// It repeats.
+    Repeating,
+}
+
+/// Where the texels of a triangle of the original lie.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TriangleTexels {
+    /// See [`SourceTriangle::chart`].
+    pub chart: u32,
+    /// See [`SourceTriangle::texels`].
+    pub texels: [[f64; 2]; 3],
+    /// See [`SourceTriangle::image`].
+    pub image: ImageKind,
+}
+
+impl Default for TriangleTexels {
+    fn default() -> Self {
+        Self { chart: NO_CHART, texels: [[0.0; 2]; 3], image: ImageKind::Plain }
+    }
 }
 
 impl SourceTriangle {
@@ -57,59 +98,55 @@ pub(crate) struct SurfacePoint {
     pub distance: f64,
 }
 
-/// A triangle has at most so many times the density of all together. One that has more lost its
-/// area, as rounding to a lattice makes it, and says nothing of how sharp the original is.
-const MOST_DENSITY: f64 = 1e4;
-
-/// Gives triangles that all but lost their area the density of all together.
-fn limit_density(triangles: &mut [SourceTriangle]) {
-    let texels: f64 = triangles.iter().map(SourceTriangle::texel_area).sum();
-    let sound = triangles.iter().filter(|triangle| triangle.density.is_finite());
-    let metres: f64 = sound
-        .filter(|triangle| triangle.density > 0.0)
-        .map(|triangle| triangle.texel_area() / triangle.density)
-        .sum();
-    let mean = if metres > 0.0 { texels / metres } else { 0.0 };
-    for triangle in triangles {
-        if !triangle.density.is_finite() || triangle.density > mean * MOST_DENSITY {
-            triangle.density = mean;
-        }
-    }
-}
-
 impl BakeSource {
-    /// The triangles of `mesh` whose material is of some class. `texels` gives the texture of a
-    /// triangle, its chart, and where its corners lie in the image.
+    /// The triangles of `mesh` whose material is of some class. `texels` says of each that has an image
+    /// where its texels lie.
     pub fn new(
         mesh: &Mesh,
         classes: &BakeClasses,
-        texels: impl Fn([u32; 3]) -> Option<(u32, u32, [[f64; 2]; 3])>,
+        texels: impl Fn([u32; 3]) -> Option<TriangleTexels>,
     ) -> Self {
         let mut triangles = Vec::new();
         let mut sources = Vec::new();
         for &triangle in &mesh.triangles {
-            if classes.of(mesh.triangle_material(triangle)).is_none() {
+            let material = mesh.triangle_material(triangle);
+            if classes.of(material).is_none() {
                 continue;
             }
-            let Some((texture, chart, texels)) = texels(triangle) else { continue };
+            let TriangleTexels { chart, texels, image } = texels(triangle).unwrap_or_default();
             let [a, b, c] = mesh.corners(triangle);
             let cross = (b - a).cross(c - a);
-            let [p, q, r] = texels.map(glam::DVec2::from);
-            let texel_area = (q - p).perp_dot(r - p).abs();
+            let [p, q, r] = texels.map(DVec2::from);
             let colored = !mesh.colors.is_empty();
             sources.push(SourceTriangle {
                 normal: cross.normalize_or_zero(),
-                texture,
+                area: cross.length() * 0.5,
+                material,
+                is_lit: classes.is_lit(material),
+                image,
                 chart,
                 texels: texels.map(|corner| corner.map(|value| value as f32)),
                 colors: colored.then(|| triangle.map(|vertex| mesh.colors[vertex as usize])),
-                density: texel_area / cross.length().max(f64::MIN_POSITIVE),
+                density: (q - p).perp_dot(r - p).abs() / cross.length().max(f64::MIN_POSITIVE),
             });
             triangles.push(triangle);
         }
-        limit_density(&mut sources);
+        let repeating_texels = density::settle(&mut sources);
+        let unlit = sources.iter().filter(|source| !source.is_lit);
+        let unlit_area = unlit.map(|source| source.area).sum();
         let positions = mesh.positions.iter().map(|&position| wide(position)).collect();
-        Self { surface: Surface::new(positions, triangles), triangles: sources }
+        let surface = Surface::new(positions, triangles);
+        Self { surface, triangles: sources, repeating_texels, unlit_area }
+    }
+
+    /// Square metres of the triangles that are not lit.
+    pub fn unlit_area(&self) -> f64 {
+        self.unlit_area
+    }
+
+    /// Texels at full detail of the triangles whose texture repeats.
+    pub fn repeating_texels(&self) -> f64 {
+        self.repeating_texels
     }
 
     /// The point nearest to `point` on a surface with this unit normal. The search begins at the
@@ -164,39 +201,5 @@ impl BakeSource {
     /// What a triangle shows.
     pub fn triangle(&self, triangle: u32) -> &SourceTriangle {
         &self.triangles[triangle as usize]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A triangle of half a texel.
-    fn triangle(density: f64) -> SourceTriangle {
-        SourceTriangle {
-            normal: DVec3::Z,
-            texture: 0,
-            chart: 0,
-            texels: [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
-            colors: None,
-            density,
-        }
-    }
-
-    #[test]
-    fn triangles_without_area_have_the_density_of_all_together() {
-        let limited = |densities: &[f64]| {
-            let mut triangles: Vec<_> = densities.iter().map(|&at| triangle(at)).collect();
-            limit_density(&mut triangles);
-            triangles.into_iter().map(|triangle| triangle.density).collect::<Vec<f64>>()
-        };
-        assert_eq!(limited(&[100.0, 400.0, 0.0]), [100.0, 400.0, 0.0], "all sound");
-        let mean = |count: f64| count / (2.0 / 100.0);
-        for lost in [f64::INFINITY, f64::NAN, 1e300, 0.5 / f64::MIN_POSITIVE] {
-            let found = limited(&[100.0, 100.0, lost]);
-            assert_eq!(found[..2], [100.0; 2]);
-            assert!((found[2] - mean(3.0)).abs() < 1e-9, "{found:?}");
-        }
-        assert_eq!(limited(&[f64::INFINITY]), [0.0], "nothing is known");
     }
 }

@@ -89,7 +89,7 @@ fn a_seam_that_one_side_alone_sees_fixes_the_vertex_for_both() {
     };
     mesh.materials[7] = 1;
     let all = ["a", "b"].map(Material::plain);
-    let classes = BakeClasses::new(&all, |_| true);
+    let classes = BakeClasses::new(&all, |_| true, |_| true);
     for (baked, level) in [(None, 1), (Some(&classes), 2)] {
         let rule = KeepRule { shares: vec![0.0, 1.0], baked, ..rule() };
         let how = at_2(&rule);

@@ -36,7 +36,7 @@ mod tests {
         let cut_out = Material { alpha: AlphaMode::Mask { cutoff: 0.5 }, ..textured() };
         let materials = [Material::plain("roof"), textured(), cut_out];
         let is_textured = |material| material > 0;
-        let classes = BakeClasses::new(&materials, is_textured);
+        let classes = BakeClasses::new(&materials, is_textured, |_| true);
         let extrudable = Extrudable::new(materials.len(), is_textured, &classes);
         assert_eq!(extrudable.materials(false), [true, false, false]);
         assert_eq!(extrudable.materials(true), [true, true, false]);
