@@ -100,6 +100,8 @@ pub struct BlockSetup<'a> {
     cache: &'a TextureCache<'a>,
     extrudable: &'a Extrudable,
     reorientable: Vec<bool>,
+    /// By material: whether others are seen through it.
+    see_through: Vec<bool>,
     hierarchy: HierarchyOptions,
 }
 
@@ -117,7 +119,9 @@ impl<'a> BlockSetup<'a> {
             hierarchy.tolerance.sliver_steps = hierarchy.tolerance.sliver_steps.min(1.0);
         }
         let reorientable = cache.model().materials.iter().map(reorientable).collect();
-        Self { target, up, cache, extrudable, reorientable, hierarchy }
+        let blends = |material: &Material| material.alpha == AlphaMode::Blend;
+        let see_through = cache.model().materials.iter().map(blends).collect();
+        Self { target, up, cache, extrudable, reorientable, see_through, hierarchy }
     }
 
     /// Returns where nodes are written.
@@ -179,6 +183,7 @@ impl<'a> BlockSetup<'a> {
             quantization: options.quantization(),
             up: self.up,
             reorientable: &self.reorientable,
+            see_through: &self.see_through,
             extrudable: self.extrudable,
             sink,
             stages,

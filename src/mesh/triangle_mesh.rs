@@ -53,6 +53,18 @@ impl<C: Coordinate> Mesh<C> {
         )
     }
 
+    /// Adds the vertices and triangles of a mesh that has the same attributes.
+    pub fn append(&mut self, other: Self) {
+        let first = self.positions.len() as u32;
+        let triangles = other.triangles.iter().map(|t| t.map(|vertex| first + vertex));
+        self.triangles.extend(triangles);
+        self.positions.extend(other.positions);
+        self.texcoords.extend(other.texcoords);
+        self.colors.extend(other.colors);
+        self.normals.extend(other.normals);
+        self.materials.extend(other.materials);
+    }
+
     /// Appends a copy of one of its own vertices.
     pub fn push_copy(&mut self, vertex: usize) -> u32 {
         self.push_vertex(

@@ -233,6 +233,7 @@ pub fn build_baked(
         quantization: None,
         up: hlod::mesh::UpAxis::Z,
         reorientable: &[true; 8],
+        see_through: &[],
         extrudable: &Extrudable::default(),
         sink: &sink,
         stages: &Default::default(),

@@ -151,3 +151,46 @@ fn nodes_that_would_lose_a_track_show_it_in_textures_of_their_own() {
         .assert()
         .success();
 }
+
+/// `side` by `side` red boxes, each inside of a box of glass that is a metre larger on all sides.
+fn write_boxes_in_glass(folder: &std::path::Path, side: usize) -> std::path::PathBuf {
+    let mtl = "newmtl glass\nKd 0.6 0.8 1\nd 0.3\nnewmtl red\nKd 0.8 0.1 0.1\n";
+    write(folder, "glass.mtl", mtl);
+    let mut text = String::from("mtllib glass.mtl\n");
+    let mut first = 1;
+    for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
+        let height = 10 + (i * 7 + j * 3) % 9;
+        for (material, half, top) in [("glass", 5.0, height), ("red", 4.0, height - 1)] {
+            let _ = writeln!(text, "usemtl {material}");
+            for z in [0, top] {
+                for (x, y) in [(-half, -half), (half, -half), (half, half), (-half, half)] {
+                    let [x, y] = [i as f64 * 20.0 + x, j as f64 * 20.0 + y];
+                    let _ = writeln!(text, "v {x} {y} {z}");
+                }
+            }
+            let sides = ["3 2 1 0", "4 5 6 7", "0 1 5 4", "1 2 6 5", "2 3 7 6", "3 0 4 7"];
+            for side in sides {
+                let corners = side.split(' ').map(|at| at.parse::<usize>().unwrap() + first);
+                let corners: Vec<String> = corners.map(|at| at.to_string()).collect();
+                let _ = writeln!(text, "f {}", corners.join(" "));
+            }
+            first += 8;
+        }
+    }
+    write(folder, "glass.obj", text)
+}
+
+#[test]
+fn what_stands_behind_glass_is_not_left_out_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = write_boxes_in_glass(folder.path(), 20);
+    let out = tempfile::tempdir().unwrap();
+    let hierarchy = HierarchyOptions { desired_tris: 800, ..HierarchyOptions::default() };
+    let options = BuildOptions { hierarchy, ..BuildOptions::default() };
+    build(std::slice::from_ref(&input), out.path(), &options, &Silent).unwrap();
+    hlod_build()
+        .args(["verify", "--quiet", "--samples", "20000"])
+        .args([out.path().to_str().unwrap(), "--source", input.to_str().unwrap()])
+        .assert()
+        .success();
+}

@@ -83,7 +83,15 @@ struct NodeLadder<'a> {
     /// Number of skirt triangles that the thinned border needs.
     skirt_triangles: usize,
     rules: SkirtRules,
+    ladders: Vec<SurfaceLadder<'a>>,
+}
+
+/// The ladder of what hides others, or of what others are seen through: simplified as one, the larger would stand
+/// for both.
+struct SurfaceLadder<'a> {
     ladder: Ladder<'a>,
+    /// Of the triangles that the node may have.
+    share: f64,
 }
 
 /// How a coarse node ends.
@@ -292,22 +300,54 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             without: self.options.without,
             constants,
         };
-        let ladder = Ladder::new(&mesh, &border, path, at, method);
-        NodeLadder { source, mesh, border, normal_sets, spans, skirt_triangles, rules, ladder }
+        let ladders =
+            self.surface_ladders(&mesh, |mesh| Ladder::new(mesh, &border, path, at, method));
+        NodeLadder { source, mesh, border, normal_sets, spans, skirt_triangles, rules, ladders }
     }
 
-    /// The ladder's result for a budget, with its sections capped and its skirts.
+    /// The ladders of a mesh: of its solid triangles, and of those through which others are seen.
+    fn surface_ladders<'l>(
+        &self,
+        mesh: &Mesh,
+        ladder: impl Fn(&Mesh) -> Ladder<'l>,
+    ) -> Vec<SurfaceLadder<'l>> {
+        let is_see_through = |&triangle: &[u32; 3]| {
+            let material = mesh.triangle_material(triangle) as usize;
+            self.see_through.get(material).copied().unwrap_or(false)
+        };
+        let (see_through, solid): (Vec<[u32; 3]>, Vec<[u32; 3]>) =
+            mesh.triangles.iter().partition(|triangle| is_see_through(triangle));
+        if see_through.is_empty() || solid.is_empty() {
+            return vec![SurfaceLadder { ladder: ladder(mesh), share: 1.0 }];
+        }
+        let area = mesh.area();
+        let of = |triangles: Vec<[u32; 3]>| {
+            let part = Mesh { triangles, ..mesh.clone() };
+            SurfaceLadder { share: part.area() / area, ladder: ladder(&part) }
+        };
+        vec![of(solid), of(see_through)]
+    }
+
+    /// The ladders' result for a budget, with its sections capped and its skirts.
     fn simplified(&self, with: &NodeLadder, node: &CoarseNode, budget: usize) -> Coarse {
-        let NodeLadder { source, mesh, border, normal_sets, spans, rules, ladder, .. } = with;
+        let NodeLadder { source, mesh, border, normal_sets, spans, rules, ladders, .. } = with;
         let path = node.path;
         // Skirts count towards the budget, but may not take more than half of it.
         let target = budget.saturating_sub(with.skirt_triangles).max(budget / 2).max(1);
-        let mut result = ladder.simplified(target);
+        let of = |SurfaceLadder { ladder, share }: &SurfaceLadder| {
+            ladder.simplified(((target as f64 * share).round() as usize).max(1))
+        };
+        let joined = |mut one: Simplified, other| {
+            one.join(other);
+            one
+        };
+        let fallback = || fallback_triangles(source, border, FALLBACK_TRIANGLES.min(target));
+        let mut result = ladders.iter().map(of).reduce(joined).unwrap_or_else(fallback);
         if self.quantization.is_some() {
             result = self.snapped(result);
         }
         if result.mesh.triangles.is_empty() {
-            result = fallback_triangles(source, border, FALLBACK_TRIANGLES.min(target));
+            result = fallback();
         }
         cap_sections(&mut result, spans, path, mesh, border);
         if let Some(sets) = normal_sets {

@@ -19,16 +19,20 @@ pub struct Simplified {
 impl Simplified {
     /// Adds another mesh, whose vertices lie on no border or on the same ones.
     pub fn append(&mut self, other: Mesh, border: Border) {
-        let first = self.mesh.positions.len() as u32;
-        let triangles = other.triangles.iter().map(|t| t.map(|vertex| first + vertex));
-        self.mesh.triangles.extend(triangles);
-        self.mesh.positions.extend(other.positions);
-        self.mesh.texcoords.extend(other.texcoords);
-        self.mesh.colors.extend(other.colors);
-        self.mesh.normals.extend(other.normals);
-        self.mesh.materials.extend(other.materials);
+        self.mesh.append(other);
         self.border.planes.extend(border.planes);
         self.border.keep.extend(border.keep);
+    }
+}
+
+impl Simplified {
+    /// Adds a surface that was simplified beside this one; the step is that of the larger.
+    pub fn join(&mut self, other: Self) {
+        if other.mesh.triangles.len() > self.mesh.triangles.len() {
+            self.step = other.step;
+        }
+        self.error = self.error.max(other.error);
+        self.append(other.mesh, other.border);
     }
 }
 
