@@ -1,27 +1,37 @@
-"""Draws level 0 of real meshes beside their source, from two distances; see scripts/levels."""
+"""Draws level 0 of real meshes and of a generated track beside their source, from two distances; see scripts/levels."""
 
 import json
 import shutil
 import subprocess
 
+import race_track
 from common import DOCS, REAL, Options, Programs, real_data, run, say, table, write_between_markers
 
 PAGE = DOCS / "levels.md"
+TRACK = "race_track"
 
 
 def main():
     options = Options("levels", __doc__)
-    options.add_argument("--sets", nargs="+", choices=REAL, default=REAL, help="[all]")
+    sets = [*REAL, TRACK]
+    options.add_argument("--sets", nargs="+", choices=sets, default=sets, help="[all]")
     arguments = options.parse()
     examples = ["level_views", "tile_pictures"]
     programs = Programs(examples=examples, features=True)
     for name in arguments.sets:
-        if models := real_data(name):
+        if models := models_of(programs, name):
             say(name)
             text = section(programs, name, models, arguments.write)
             print(text)
             if arguments.write:
                 write_between_markers(PAGE, name, text)
+
+
+def models_of(programs, name):
+    """Model files of a set: of the real data, or the generated track."""
+    if name != TRACK:
+        return real_data(name)
+    return [race_track.write(programs.work / TRACK)]
 
 
 def section(programs, name, models, write):

@@ -20,19 +20,19 @@ use crate::texture::{
 /// Where nodes go, and how they are built.
 #[derive(Clone, Copy)]
 pub struct Target<'a> {
-    /// How.
+    /// Build options.
     pub options: &'a BuildOptions,
     /// The output folder.
     pub out: &'a OutputDir,
     /// Repeating textures of the whole build.
     pub shared: &'a SharedTextures,
-    /// Where the time goes.
+    /// Timers of the stages.
     pub stages: &'a Stages,
     /// Told of finished leaves.
     pub progress: &'a dyn Progress,
 }
 
-/// How the materials of a model may be treated.
+/// Rules for the materials of a model.
 #[derive(Debug)]
 pub struct Appearances {
     /// Which textures are cut up.
@@ -44,7 +44,7 @@ pub struct Appearances {
 }
 
 impl Appearances {
-    /// Of a model whose untextured materials are merged.
+    /// Decides for a model whose untextured materials are merged.
     pub fn new(model: &Model) -> Self {
         Self::of(model, TexturePlan::new(model))
     }
@@ -58,7 +58,7 @@ impl Appearances {
         Self { textures, kinds, extrudable }
     }
 
-    /// Of each part the material that stands for what it looks like; `None` where its colours may not
+    /// Returns for each part the material that stands for its appearance; `None` where its colours may not
     /// leave its triangles.
     pub fn kinds(&self, parts: &[Part]) -> Vec<Option<u32>> {
         let kind = |part: &Part| self.kinds.get(part.material as usize).copied().flatten();
@@ -66,8 +66,8 @@ impl Appearances {
     }
 }
 
-/// By material, the first that differs from it in nothing but an image that is cut up. `None` of images that
-/// repeat, and of cut-outs.
+/// Returns by material the first that differs from it in nothing but an image that is cut up; `None` for images
+/// that repeat, and for cut-outs.
 fn kinds(materials: &[Material], textures: &TexturePlan) -> Vec<Option<u32>> {
     let mut first_alike = BTreeMap::new();
     let kind = |(number, material): (u32, &Material)| {

@@ -90,7 +90,7 @@ struct NodeLadder<'a> {
 /// for both.
 struct SurfaceLadder<'a> {
     ladder: Ladder<'a>,
-    /// Of the triangles that the node may have.
+    /// Share of the triangles that the node may have.
     share: f64,
 }
 

@@ -22,7 +22,7 @@ pub struct BakedMesh {
     pub(in crate::texture) images: Vec<LevelImage>,
 }
 
-/// What a vertex of a baked mesh is of.
+/// Owner of a vertex of a baked mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Owner {
     Chart(u32),

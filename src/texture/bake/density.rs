@@ -1,9 +1,9 @@
-//! How many texels triangles of the original deserve in a square metre at full detail.
+//! The number of texels that triangles of the original deserve in a square metre at full detail.
 
 use super::source::{ImageKind, SourceTriangle};
 
-/// Triangles of the original whose image repeats get so many texels on average. With more, images get more
-/// bytes than levels whose textures are shared.
+/// Triangles of the original whose image repeats get so many texels on average. Images with
+/// more take more bytes than levels whose textures are shared.
 const REPEATING_TEXELS: f64 = 64.0;
 
 /// Gives triangles, whose density is that of their images, the density that they deserve. Returns the texels of

@@ -29,7 +29,7 @@ pub(super) struct LightVotes<'a> {
 }
 
 impl<'a> LightVotes<'a> {
-    /// For the triangles of a mesh.
+    /// Prepares to ask about triangles of a mesh.
     pub fn new(source: &'a BakeSource, mesh: &'a Mesh) -> Self {
         Self { source, mesh, before: None, colors: Vec::new() }
     }

@@ -1,4 +1,4 @@
-//! What baked textures show of materials that repeat, of plain ones and of lit ones.
+//! Tests that baked textures show materials that repeat, plain ones and lit ones.
 
 use std::path::PathBuf;
 

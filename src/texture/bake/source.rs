@@ -39,7 +39,7 @@ pub(crate) struct SourceTriangle {
     pub material: u32,
     /// It is shown with light.
     pub is_lit: bool,
-    /// What its texels are of.
+    /// The kind of its image.
     pub image: ImageKind,
     /// Triangles of one chart lie beside each other in the image as they do in space.
     pub chart: u32,
@@ -64,7 +64,7 @@ pub(crate) enum ImageKind {
     Repeating,
 }
 
-/// Where the texels of a triangle of the original lie.
+/// Positions of the texels of a triangle of the original.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TriangleTexels {
     /// See [`SourceTriangle::chart`].

@@ -7,11 +7,11 @@ use crate::mesh::Wrap;
 use crate::texture::block::{BlockTextures, Prepared};
 use crate::texture::level::{LevelImage, Sampler};
 
-/// How an image goes on beyond its sides.
+/// Continuation of an image beyond its sides.
 #[derive(Clone, Copy)]
 struct Wrapping {
     modes: [Wrap; 2],
-    /// Of the whole image, texels of the level.
+    /// Size of the whole image, texels of the level.
     size: DVec2,
 }
 

@@ -1,4 +1,4 @@
-//! How much of a node that keeps the source's materials shows another colour than the source does there.
+//! The share of a node's surface that shows another material's colour than the source does there.
 
 use glam::Vec3;
 
