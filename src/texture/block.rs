@@ -1,8 +1,9 @@
 //! The textures of one block: what its nodes copy their texels from.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::bake::classes::BakeClasses;
@@ -74,6 +75,8 @@ pub struct BlockTextures<'a> {
     bake_always: Option<BakeReason>,
     /// Whether coarse nodes are baked that miss their budget.
     bakes_over_budget: bool,
+    /// By texture of the model: the mean colour of its image, linear light, once it was asked for.
+    pub(super) means: Vec<OnceLock<Vec3>>,
     used_texels: u64,
     /// Square metres of the block's triangles whose textures are cut up.
     area: f64,
@@ -181,6 +184,7 @@ impl<'a> BlockTextures<'a> {
             source: None,
             bake_always: None,
             bakes_over_budget: false,
+            means: vec![OnceLock::new(); plan.texture_count()],
             used_texels,
             area: 0.0,
         };

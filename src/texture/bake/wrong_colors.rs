@@ -78,11 +78,12 @@ impl BlockTextures<'_> {
     /// The mean of a material's image times its colour, linear light, 0–1; `None` where it has no image.
     fn mean_light(&self, material: u32) -> Option<Vec3> {
         let texture = self.material_textures.get(material as usize).copied().flatten()?;
-        let mean = match self.textures.get(texture as usize)? {
+        let coarsest = match self.textures.get(texture as usize)? {
             Prepared::Absent => return None,
-            Prepared::Atlas(source) => source.levels.first()?.mean(),
-            Prepared::Repeating(decoded) => decoded.pyramid().first()?.mean(),
+            Prepared::Atlas(source) => source.levels.first()?,
+            Prepared::Repeating(decoded) => decoded.pyramid().first()?,
         };
+        let mean = *self.means.get(texture as usize)?.get_or_init(|| coarsest.mean());
         Some(mean * self.factor_of(material).truncate())
     }
 }
