@@ -37,7 +37,7 @@ pub struct Target<'a> {
 pub struct Appearances {
     /// Which textures are cut up.
     pub textures: TexturePlan,
-    /// By material: see [`Self::kinds`].
+    /// Holds by material what [`Self::kinds`] returns.
     kinds: Vec<Option<u32>>,
     /// Which materials prisms may have.
     pub extrudable: Extrudable,
@@ -100,7 +100,7 @@ pub struct BlockSetup<'a> {
     cache: &'a TextureCache<'a>,
     extrudable: &'a Extrudable,
     reorientable: Vec<bool>,
-    /// By material: whether others are seen through it.
+    /// Tells by material whether others are seen through it.
     see_through: Vec<bool>,
     hierarchy: HierarchyOptions,
 }

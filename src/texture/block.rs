@@ -73,7 +73,7 @@ pub struct BlockTextures<'a> {
     pub(super) source: Option<BakeSource>,
     /// Why all coarse nodes are baked, where they are.
     bake_always: Option<BakeReason>,
-    /// Whether coarse nodes are baked that miss their budget.
+    /// Coarse nodes that miss their budget are baked where this is true.
     bakes_over_budget: bool,
     /// By texture of the model: the mean colour of its image, linear light, once it was asked for.
     pub(super) means: Vec<OnceLock<Vec3>>,

@@ -73,8 +73,8 @@ impl Sampler<'_> {
         upper + (lower - upper) * down
     }
 
-    /// The same of an image that goes on at its other side along the axes where it `repeats`, for a
-    /// position inside of it.
+    /// Returns the colour at a position inside of an image that goes on at its other side along the axes where it
+    /// `repeats`, linear light, 0–1, and 1.
     pub fn at_repeating(&self, at: DVec2, repeats: [bool; 2]) -> Vec4 {
         // Two texels, and the share of the second.
         let pair = |axis: usize| {

@@ -57,7 +57,7 @@ pub struct BlockBuilder<'a, S> {
     pub up: UpAxis,
     /// Of each material, whether its faces may be reoriented ([`crate::builder::simplify::orient`]).
     pub reorientable: &'a [bool],
-    /// Of each material, whether others are seen through it.
+    /// Tells by material whether others are seen through it.
     pub see_through: &'a [bool],
     /// Of each material, whether prisms may have it.
     pub extrudable: &'a Extrudable,

@@ -12,7 +12,7 @@ pub struct BakeClasses {
     first: Vec<Option<u32>>,
     /// By class, named by its first material: its first materials that are unlit and lit.
     by_light: BTreeMap<u32, [Option<u32>; 2]>,
-    /// By material: whether it is shown with light.
+    /// Tells by material whether it is shown with light.
     is_lit: Vec<bool>,
 }
 
@@ -47,7 +47,7 @@ impl BakeClasses {
         Self { first, by_light, is_lit }
     }
 
-    /// Whether a material is shown with light.
+    /// Tells whether a material is shown with light.
     pub fn is_lit(&self, material: u32) -> bool {
         self.is_lit.get(material as usize).copied().unwrap_or(true)
     }

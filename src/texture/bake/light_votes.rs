@@ -1,4 +1,4 @@
-//! Whether a triangle of a node stands for what is lit, and of what colour that is.
+//! Votes on whether a triangle of a node stands for lit surface, and on its colour.
 
 use glam::DVec3;
 
@@ -34,7 +34,7 @@ impl<'a> LightVotes<'a> {
         Self { source, mesh, before: None, colors: Vec::new() }
     }
 
-    /// Whether hardly anything but what is lit is near a triangle.
+    /// Returns true where hardly anything but lit surface is near a triangle.
     pub fn is_lit(&mut self, triangle: [u32; 3]) -> bool {
         self.colors.clear();
         for weights in POINTS {

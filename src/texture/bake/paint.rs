@@ -103,8 +103,8 @@ impl BlockTextures<'_> {
         nearby.density(mesh, triangles).sqrt() / self.steps[level]
     }
 
-    /// What the scales of charts, of so many square metres on the node, are multiplied with so that with
-    /// their gutters they take no more than the node's share.
+    /// Returns the factor of the charts' scales with which they and their gutters take no more than the node's
+    /// share of texels. The charts have `area` square metres on the node.
     pub(super) fn fitted(&self, area: f64, charts: &[FlatChart], level: usize) -> f64 {
         let cell = self.baked_cell(level);
         let part = if level == 0 { 1.0 } else { CELLS };
@@ -213,7 +213,7 @@ impl BlockTextures<'_> {
         Sampling { side, wide: side < most }
     }
 
-    /// What the original shows at a point, with `scale` texels a metre, linear light, 0–1.
+    /// Returns the colour of the original at a point, with `scale` texels a metre, linear light, 0–1.
     fn color_at(&self, source: &BakeSource, point: SurfacePoint, scale: f64) -> Vec3 {
         let triangle = source.triangle(point.triangle);
         let sampler = self.image_of(triangle).and_then(|image| {

@@ -50,7 +50,7 @@ pub struct BakePlan<'a> {
     pub classes: &'a BakeClasses,
     /// The reason to bake every coarse node; `None` if only those that need it are baked.
     pub always: Option<BakeReason>,
-    /// Whether a node is baked that misses its budget.
+    /// A node that misses its budget is baked where this is true.
     pub where_over_budget: bool,
     /// The block whose colours nodes are compared with; `None` compares none.
     pub textures: Option<&'a BlockTextures<'a>>,
@@ -67,8 +67,8 @@ impl BakePlan<'_> {
     }
 }
 
-/// Which coarse nodes of a block are baked, from its number of charts that are cut up and the triangles of
-/// its root: the reason for all of them, and otherwise whether those are that miss their budget.
+/// Decides which coarse nodes of a block are baked, from its number of charts that are cut up and the triangles
+/// of its root. Returns the reason to bake all of them, and whether to bake those that miss their budget.
 pub(crate) fn bake_decision(charts: usize, triangles: usize) -> (Option<BakeReason>, bool) {
     let always = (charts * TORN > triangles).then_some(BakeReason::Torn);
     (always, charts * DOUBTFUL > triangles)

@@ -30,7 +30,7 @@ pub(super) struct Samples<'a> {
 struct Shading<'a> {
     /// `None` where the triangle has no texture.
     sampler: Option<WrappedSampler<'a>>,
-    /// Of its material.
+    /// Colour of the material, which multiplies that of the image.
     factor: Vec4,
     /// The position in its image of the origin of the chart, and by column and row.
     texels: [DVec2; 3],

@@ -48,7 +48,7 @@ impl BlockTextures<'_> {
         wrong as f64 / points.max(1) as f64
     }
 
-    /// Whether the source looks otherwise at a point than a triangle of a node.
+    /// Returns true where the source has another colour at a point than a triangle of a node.
     fn is_wrong(
         &self,
         source: &BakeSource,
