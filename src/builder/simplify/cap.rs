@@ -4,6 +4,9 @@
 //! one half up, edges of the border go with it, and who looks from there would see into the other
 //! half, whatever level that has. A collapse that ends well leaves the section as a face; where it
 //! did not, or other ways than collapse were taken, the section is closed here.
+//!
+//! An edge that is lost alone bounds no section, but the neighbour is open there: it comes back with the triangle
+//! that had it.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +15,7 @@ use rustc_hash::FxHashMap;
 use crate::builder::border::chain::{BorderVertex, chains_of};
 use crate::builder::border::rank::SurfaceQuadric;
 use crate::builder::border::span::{BorderSpan, edges_of};
-use crate::builder::border::thin::EdgeKey;
+use crate::builder::border::thin::{EdgeKey, edge_key};
 use crate::builder::border::vertex::{Border, Path};
 use crate::builder::simplify::simplified::Simplified;
 use crate::mesh::{Mesh, PositionKey, Triangulator, key};
@@ -61,11 +64,20 @@ pub fn cap_sections(
     let middle: [f32; 3] = std::array::from_fn(|axis| (low[axis] + high[axis]) * 0.5);
     let source = Side::new(thinned, thinned_border, path);
     let mut triangulator = Triangulator::default();
+    let mut of_edge = None;
     for (plane, edges) in lost {
         let plane = path.plane(plane);
         // Lids face away from the other half, to where the rest of this node is.
         let above = middle[plane.axis] > plane.coordinate;
         for section in sections(&edges, &source) {
+            if let &[a, b] = &section[..] {
+                let of_edge = of_edge.get_or_insert_with(|| border_triangles(&source));
+                if let Some(triangle) = of_edge.get(&edge_key(thinned, [a, b])) {
+                    let vertices = corners_of(triangle, &source, result, path);
+                    result.mesh.triangles.extend(<[u32; 3]>::try_from(vertices));
+                }
+                continue;
+            }
             let corners: Vec<[f64; 3]> = section
                 .iter()
                 .map(|&vertex| thinned.positions[vertex as usize].map(f64::from))
@@ -136,8 +148,23 @@ fn sections(edges: &[EdgeKey], source: &Side) -> Vec<Vec<u32>> {
         }
         section.iter_mut().for_each(|vertex| *vertex = vertices[*vertex as usize]);
     }
-    sections.retain(|section| section.len() >= 3);
+    sections.retain(|section| section.len() >= 2);
     sections
+}
+
+/// The first triangle that has each edge between vertices of the border.
+fn border_triangles(side: &Side) -> FxHashMap<EdgeKey, [u32; 3]> {
+    let is_on_border =
+        |&vertex: &u32| side.at.contains_key(&key(side.mesh.positions[vertex as usize]));
+    let mut of_edge = FxHashMap::default();
+    for &[a, b, c] in &side.mesh.triangles {
+        for ends in [[a, b], [b, c], [c, a]] {
+            if ends.iter().all(is_on_border) {
+                of_edge.entry(edge_key(side.mesh, ends)).or_insert([a, b, c]);
+            }
+        }
+    }
+    of_edge
 }
 
 /// Twice the area of triangles, seen along an axis.
@@ -257,8 +284,13 @@ mod tests {
         assert_eq!(result.mesh.positions.len(), 6 + 2);
         let (_, caps) = closed(1.0, |at| at < 10);
         assert!(caps.is_empty(), "no edge of the border is gone");
-        // One edge alone bounds nothing.
-        let (_, caps) = closed(1.0, |at| at < 8);
-        assert!(caps.is_empty());
+    }
+
+    #[test]
+    fn an_edge_that_is_lost_alone_comes_back_with_its_triangle() {
+        let (mesh, ..) = half(1.0);
+        let (result, added) = closed(1.0, |at| at < 8);
+        assert_eq!(added, [mesh.triangles[8].map(|vertex| mesh.positions[vertex as usize])]);
+        assert_eq!(result.mesh.positions.len(), 10, "the corners are there");
     }
 }
