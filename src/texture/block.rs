@@ -6,18 +6,16 @@ use std::sync::{Arc, OnceLock};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::bake::classes::BakeClasses;
-use super::bake::plan::{BakePlan, BakeReason, bake_decision};
-use super::bake::source::{BakeSource, ImageKind, TriangleTexels};
+use super::bake::prepared::PreparedBake;
 use super::bits::BitGrid;
 use super::cache::{Decoded, TextureCache};
-use super::charts::{self, Charts, UvBox};
+use super::charts::{Charts, UvBox};
 use super::level::{self, LevelImage, Region};
 use super::plan::{self, TextureUse};
 use super::raster::{self, Rasterizer};
 use super::shared::SharedTextures;
 use crate::decode::DecodedTexture;
-use crate::mesh::{Mesh, Model, Wrap};
+use crate::mesh::{Mesh, Model};
 use crate::stage_timer::StageTimer;
 
 /// What of the texture work can be chosen.
@@ -67,17 +65,11 @@ pub struct BlockTextures<'a> {
     pub(super) textures: Vec<Prepared>,
     /// By material of the model.
     pub(super) material_textures: Vec<Option<u32>>,
-    /// The materials that may be baked.
-    pub(super) classes: BakeClasses,
-    /// What nodes are baked from; `None` where none is.
-    pub(super) source: Option<BakeSource>,
-    /// Why all coarse nodes are baked, where they are.
-    bake_always: Option<BakeReason>,
-    /// Coarse nodes that miss their budget are baked where this is true.
-    bakes_over_budget: bool,
+    /// What coarse nodes may be baked from; `None` where none is.
+    pub(super) bake_source: Option<PreparedBake>,
     /// By texture of the model: the mean colour of its image, linear light, once it was asked for.
     pub(super) means: Vec<OnceLock<Vec3>>,
-    used_texels: u64,
+    pub(super) used_texels: u64,
     /// Square metres of the block's triangles whose textures are cut up.
     area: f64,
 }
@@ -180,116 +172,14 @@ impl<'a> BlockTextures<'a> {
             steps,
             textures,
             material_textures,
-            classes: BakeClasses::default(),
-            source: None,
-            bake_always: None,
-            bakes_over_budget: false,
+            bake_source: None,
             means: vec![OnceLock::new(); plan.texture_count()],
             used_texels,
             area: 0.0,
         };
         block.area = block.atlas_area(mesh);
-        block.prepare_bake(mesh, &usage);
+        block.bake_source = block.prepare_bake(mesh, &usage.charts);
         block
-    }
-
-    /// Keeps what coarse nodes may be baked from.
-    fn prepare_bake(&mut self, mesh: &Mesh, usage: &Usage) {
-        if self.steps.len() < 2 || mesh.texcoords.len() != mesh.positions.len() {
-            return;
-        }
-        let image = |material: u32| {
-            let texture = self.material_textures.get(material as usize).copied().flatten()?;
-            self.textures.get(texture as usize).filter(|image| !matches!(image, Prepared::Absent))
-        };
-        let mut is_used = vec![false; self.model.materials.len()];
-        for &material in &mesh.materials {
-            if let Some(used) = is_used.get_mut(material as usize) {
-                *used = true;
-            }
-        }
-        let classes = BakeClasses::new(
-            &self.model.materials,
-            |material| image(material).is_some(),
-            |material| is_used[material as usize],
-        );
-        if classes.is_empty() {
-            return;
-        }
-        let mut charts: Vec<u32> = mesh
-            .triangles
-            .iter()
-            .filter(|triangle| {
-                let material = mesh.triangle_material(**triangle);
-                let is_cut_up = matches!(image(material), Some(Prepared::Atlas(_)));
-                is_cut_up && classes.of(material).is_some()
-            })
-            .map(|triangle| usage.charts.of_vertex[triangle[0] as usize])
-            .collect();
-        charts.sort_unstable();
-        charts.dedup();
-        let repeats = self.textures.iter().any(|image| matches!(image, Prepared::Repeating(_)));
-        let (always, where_over_budget) = bake_decision(charts.len(), self.options.root_triangles);
-        if always.is_none() && !where_over_budget && !repeats {
-            return;
-        }
-        let source = BakeSource::new(mesh, &classes, |triangle| {
-            let image = image(mesh.triangle_material(triangle))?;
-            let chart = usage.charts.of_vertex[triangle[0] as usize];
-            let bounds = &usage.charts.boxes[chart as usize];
-            let corners = triangle.map(|vertex| charts::sane(mesh.texcoords[vertex as usize]));
-            match image {
-                Prepared::Absent => None,
-                Prepared::Atlas(source) => {
-                    let texels = corners.map(|uv| {
-                        [0, 1].map(|axis| {
-                            let tile = source.tile(bounds, axis);
-                            (uv[axis] - tile) * source.size[axis] - source.origin[axis]
-                        })
-                    });
-                    Some(TriangleTexels { chart, texels, image: ImageKind::CutUp })
-                }
-                Prepared::Repeating(decoded) => {
-                    let size = [decoded.image.width, decoded.image.height].map(f64::from);
-                    let wrap = self.wrap_of(mesh.triangle_material(triangle));
-                    // After two periods mirrored images repeat, too.
-                    let low = [0, 1].map(|axis| {
-                        let least = corners.iter().map(|uv| uv[axis]).fold(f64::INFINITY, f64::min);
-                        if wrap[axis] == Wrap::Clamp { 0.0 } else { 2.0 * (least / 2.0).floor() }
-                    });
-                    let texels =
-                        corners.map(|uv| [0, 1].map(|axis| (uv[axis] - low[axis]) * size[axis]));
-                    Some(TriangleTexels { chart, texels, image: ImageKind::Repeating })
-                }
-            }
-        });
-        self.classes = classes;
-        self.source = Some(source);
-        self.bake_always = always;
-        self.bakes_over_budget = where_over_budget;
-    }
-
-    fn wrap_of(&self, material: u32) -> [Wrap; 2] {
-        self.model.materials.get(material as usize).map_or([Wrap::Repeat; 2], |own| own.wrap)
-    }
-
-    /// The texels that charts of this area, square metres, should have in a node of this level.
-    pub(super) fn bake_share(&self, area: f64, level: usize) -> f64 {
-        let Some(source) = &self.source else { return 0.0 };
-        let texels =
-            (self.used_texels as f64 + source.repeating_texels()) / self.steps[level].powi(2);
-        texels * (area / source.unlit_area().max(f64::MIN_POSITIVE)).min(1.0)
-    }
-
-    /// What coarse nodes may bake; `None` where it would not be worth it.
-    pub fn bake_plan(&self) -> Option<BakePlan<'_>> {
-        let plan = BakePlan {
-            classes: &self.classes,
-            always: self.bake_always,
-            where_over_budget: self.bakes_over_budget,
-            textures: Some(self),
-        };
-        self.source.as_ref().map(|_| plan)
     }
 
     /// The area of the triangles whose textures are cut up, square metres.

@@ -28,6 +28,7 @@ mod node;
 mod open_page;
 mod pack;
 mod packing;
+mod placement;
 mod plan;
 mod primitives;
 mod raster;

@@ -12,6 +12,7 @@ use super::block::{BlockTextures, Prepared};
 use super::charts::{self, Charts, NO_CHART, UvBox};
 use super::encode;
 use super::level::LevelImage;
+use super::placement::{ImagePlacement, Mapping};
 use crate::format::{NodeImage, NodeImageData, NodeMesh};
 use crate::mesh::{Mesh, Warnings, Wrap};
 use crate::{Error, Result};
@@ -67,44 +68,6 @@ pub struct TexturedNode {
     pub own_texels: u64,
     /// What could not be done as asked.
     pub warnings: Warnings,
-}
-
-/// From a chart's texture coordinates to a position in its level image:
-/// `clamp(uv · scale − offset)`, clamped to the image where it has a limit.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Mapping {
-    scale: [f64; 2],
-    offset: [f64; 2],
-    limit: [f64; 2],
-}
-
-impl Mapping {
-    /// Of coordinates that are texels.
-    const TEXELS: Self = Self { scale: [1.0; 2], offset: [0.0; 2], limit: [f64::INFINITY; 2] };
-
-    pub(super) fn texel(&self, uv: [f32; 2]) -> [f64; 2] {
-        let uv = charts::sane(uv);
-        let along = |axis: usize| {
-            let texel = uv[axis] * self.scale[axis] - self.offset[axis];
-            if self.limit[axis].is_finite() { texel.clamp(0.0, self.limit[axis]) } else { texel }
-        };
-        [along(0), along(1)]
-    }
-}
-
-/// From a position in a level image to a texture coordinate of an image.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ImagePlacement {
-    pub(super) image: usize,
-    patch: PatchPlacement,
-    unit: [f64; 2],
-}
-
-impl ImagePlacement {
-    pub(super) fn texcoord(&self, texel: [f64; 2]) -> [f32; 2] {
-        let texel = self.patch.texel(texel);
-        [0, 1].map(|axis| (texel[axis] * self.unit[axis]) as f32)
-    }
 }
 
 /// The placement of triangles without texture.
@@ -238,19 +201,16 @@ impl<'a> NodeBuilder<'a> {
 
     /// The texture of a material, where there is an image for it.
     fn texture_of(&self, material: u32) -> Option<u32> {
-        let texture = self.block.material_textures.get(material as usize).copied().flatten()?;
-        match self.block.textures.get(texture as usize)? {
-            Prepared::Absent => None,
-            _ => Some(texture),
-        }
+        let texture = self.block.material_textures.get(material as usize).copied().flatten();
+        texture.filter(|_| self.block.image_of_material(material).is_some())
     }
 
     fn find_charts(&mut self, alike: &[[u32; 2]]) {
         if self.mesh.texcoords.len() != self.mesh.positions.len() {
             return;
         }
-        let is_baked =
-            |material: u32| self.baked.is_some() && self.block.classes.of(material).is_some();
+        let bake = self.block.bake_source.as_ref().filter(|_| self.baked.is_some());
+        let is_baked = |material: u32| bake.is_some_and(|bake| bake.classes.of(material).is_some());
         let textured: Vec<bool> = (0..self.block.material_textures.len() as u32)
             .map(|material| self.texture_of(material).is_some() && !is_baked(material))
             .collect();

@@ -20,21 +20,19 @@ use crate::builder::border::vertex::{Border, Path};
 use crate::builder::simplify::simplified::Simplified;
 use crate::mesh::{Mesh, PositionKey, Triangulator, key};
 
-/// A mesh that has vertices of the border, and what is known of them.
+/// A mesh whose vertices are found by position.
 struct Side<'a> {
     mesh: &'a Mesh,
     border: &'a Border,
-    /// Its border vertices by position, in order.
+    /// The vertices at each position, in order.
     at: FxHashMap<PositionKey<f32>, Vec<u32>>,
 }
 
 impl<'a> Side<'a> {
-    fn new(mesh: &'a Mesh, border: &'a Border, path: &Path) -> Self {
+    fn new(mesh: &'a Mesh, border: &'a Border) -> Self {
         let mut at: FxHashMap<PositionKey<f32>, Vec<u32>> = FxHashMap::default();
         for (vertex, &position) in mesh.positions.iter().enumerate() {
-            if border.planes[vertex] & path.bits() != 0 {
-                at.entry(key(position)).or_default().push(vertex as u32);
-            }
+            at.entry(key(position)).or_default().push(vertex as u32);
         }
         Self { mesh, border, at }
     }
@@ -62,7 +60,7 @@ pub fn cap_sections(
     }
     let Some((low, high)) = thinned.bounds() else { return };
     let middle: [f32; 3] = std::array::from_fn(|axis| (low[axis] + high[axis]) * 0.5);
-    let source = Side::new(thinned, thinned_border, path);
+    let source = Side::new(thinned, thinned_border);
     let mut triangulator = Triangulator::default();
     let mut of_edge = None;
     for (plane, edges) in lost {
@@ -71,9 +69,9 @@ pub fn cap_sections(
         let above = middle[plane.axis] > plane.coordinate;
         for section in sections(&edges, &source) {
             if let &[a, b] = &section[..] {
-                let of_edge = of_edge.get_or_insert_with(|| border_triangles(&source));
+                let of_edge = of_edge.get_or_insert_with(|| border_triangles(&source, path));
                 if let Some(triangle) = of_edge.get(&edge_key(thinned, [a, b])) {
-                    let vertices = corners_of(triangle, &source, result, path);
+                    let vertices = corners_of(triangle, &source, result);
                     result.mesh.triangles.extend(<[u32; 3]>::try_from(vertices));
                 }
                 continue;
@@ -87,7 +85,7 @@ pub fn cap_sections(
                 continue;
             }
             let turned = normal_along(plane.axis, &corners, triangles) < 0.0;
-            let vertices = corners_of(&section, &source, result, path);
+            let vertices = corners_of(&section, &source, result);
             result.mesh.triangles.extend(triangles.iter().map(|&[a, b, c]| {
                 let triangle = if turned == above { [a, c, b] } else { [a, b, c] };
                 triangle.map(|corner| vertices[corner as usize])
@@ -153,9 +151,8 @@ fn sections(edges: &[EdgeKey], source: &Side) -> Vec<Vec<u32>> {
 }
 
 /// The first triangle that has each edge between vertices of the border.
-fn border_triangles(side: &Side) -> FxHashMap<EdgeKey, [u32; 3]> {
-    let is_on_border =
-        |&vertex: &u32| side.at.contains_key(&key(side.mesh.positions[vertex as usize]));
+fn border_triangles(side: &Side, path: &Path) -> FxHashMap<EdgeKey, [u32; 3]> {
+    let is_on_border = |&vertex: &u32| side.border.planes[vertex as usize] & path.bits() != 0;
     let mut of_edge = FxHashMap::default();
     for &[a, b, c] in &side.mesh.triangles {
         for ends in [[a, b], [b, c], [c, a]] {
@@ -179,10 +176,10 @@ fn normal_along(axis: usize, corners: &[[f64; 3]], triangles: &[[u32; 3]]) -> f6
 
 /// The corners of a lid as vertices of the result, all of one material: those that it has, and
 /// copies of the source's.
-fn corners_of(section: &[u32], source: &Side, result: &mut Simplified, path: &Path) -> Vec<u32> {
+fn corners_of(section: &[u32], source: &Side, result: &mut Simplified) -> Vec<u32> {
     let material = source.mesh.materials[section[0] as usize];
     let Simplified { mesh, border, .. } = result;
-    let there = Side::new(mesh, border, path);
+    let there = Side::new(mesh, border);
     let of = |&vertex: &u32| {
         let place = key(source.mesh.positions[vertex as usize]);
         let own = there.find(place, Some(material));

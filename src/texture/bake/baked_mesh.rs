@@ -6,6 +6,7 @@ use super::flat::flat_charts;
 use super::light_votes::LightVotes;
 use super::nearby::Nearby;
 use super::paint::Brushes;
+use super::prepared::PreparedBake;
 use crate::mesh::Mesh;
 use crate::texture::block::BlockTextures;
 use crate::texture::level::LevelImage;
@@ -35,14 +36,14 @@ impl BlockTextures<'_> {
     /// their own, or where they stand for what is lit a colour each. `None` where the block keeps nothing to
     /// bake from.
     pub fn bake(&self, mesh: &Mesh, level: usize) -> Option<BakedMesh> {
-        let source = self.source.as_ref()?;
+        let PreparedBake { classes, source, .. } = self.bake_source.as_ref()?;
         let level = self.nearest_level(level);
         let mut members = Vec::new();
         let mut lit = Vec::new();
         let mut votes = LightVotes::new(source, mesh);
         for (number, &triangle) in (0u32..).zip(&mesh.triangles) {
-            let Some(class) = self.classes.of(mesh.triangle_material(triangle)) else { continue };
-            let [unlit, lit_material] = self.classes.by_light(class);
+            let Some(class) = classes.of(mesh.triangle_material(triangle)) else { continue };
+            let [unlit, lit_material] = classes.by_light(class);
             match lit_material {
                 Some(material) if votes.is_lit(triangle) || unlit.is_none() => {
                     lit.push((number, material, votes.color()));
@@ -75,10 +76,8 @@ impl BlockTextures<'_> {
             let scale = chart.scale * factor;
             let painted = self.paint(source, mesh, chart, scale, level, &mut brushes);
             for (&triangle, texels) in chart.triangles.iter().zip(&painted.corners) {
-                let class =
-                    self.classes.of(mesh.triangle_material(mesh.triangles[triangle as usize]));
-                let [unlit, _] =
-                    class.map(|class| self.classes.by_light(class)).unwrap_or_default();
+                let class = classes.of(mesh.triangle_material(mesh.triangles[triangle as usize]));
+                let [unlit, _] = class.map(|class| classes.by_light(class)).unwrap_or_default();
                 for (corner, texel) in texels.iter().enumerate() {
                     let own = baked.own_vertex(triangle, corner, Owner::Chart(number));
                     baked.mesh.texcoords[own] = texel.as_vec2().into();

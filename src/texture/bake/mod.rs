@@ -20,6 +20,7 @@ mod paint;
 mod patchwork_tests;
 pub(super) mod plan;
 mod planar;
+pub(super) mod prepared;
 mod project;
 mod shading;
 pub(super) mod source;

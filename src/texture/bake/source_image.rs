@@ -86,8 +86,7 @@ impl WrappedSampler<'_> {
 impl BlockTextures<'_> {
     /// The image of a triangle of the original; `None` where it has none.
     pub(super) fn image_of(&self, triangle: &SourceTriangle) -> Option<SourceImage<'_>> {
-        let texture = self.material_textures.get(triangle.material as usize).copied().flatten()?;
-        match self.textures.get(texture as usize)? {
+        match self.image_of_material(triangle.material)? {
             Prepared::Absent => None,
             Prepared::Atlas(atlas) => Some(SourceImage { levels: &atlas.levels, wrapping: None }),
             Prepared::Repeating(decoded) => {

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::light_votes::point_on;
+use super::prepared::PreparedBake;
 use super::shading::tint;
 use super::source::{BakeSource, SurfacePoint};
 use crate::color;
@@ -20,12 +21,12 @@ impl BlockTextures<'_> {
     /// The share of a node's opaque surface whose material has another mean colour than that of the source
     /// nearest to it, 0–1.
     pub fn wrong_colors(&self, mesh: &Mesh) -> f64 {
-        let Some(source) = &self.source else { return 0.0 };
+        let Some(PreparedBake { classes, source, .. }) = &self.bake_source else { return 0.0 };
         let members: Vec<[u32; 3]> = mesh
             .triangles
             .iter()
             .copied()
-            .filter(|&triangle| self.classes.of(mesh.triangle_material(triangle)).is_some())
+            .filter(|&triangle| classes.of(mesh.triangle_material(triangle)).is_some())
             .collect();
         let area: f64 = members.iter().map(|&triangle| mesh.triangle_area(triangle)).sum();
         let mut random = Random::new(1, 0);
@@ -78,7 +79,7 @@ impl BlockTextures<'_> {
     /// The mean of a material's image times its colour, linear light, 0–1; `None` where it has no image.
     fn mean_light(&self, material: u32) -> Option<Vec3> {
         let texture = self.material_textures.get(material as usize).copied().flatten()?;
-        let coarsest = match self.textures.get(texture as usize)? {
+        let coarsest = match self.image_of_material(material)? {
             Prepared::Absent => return None,
             Prepared::Atlas(source) => source.levels.first()?,
             Prepared::Repeating(decoded) => decoded.pyramid().first()?,
