@@ -42,7 +42,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let without = match without.as_deref() {
         None => None,
-        Some("permissive") => Some(LadderStep::Permissive),
         Some("prune") => Some(LadderStep::Prune),
         Some("oriented") => Some(LadderStep::Oriented),
         Some("clustering") => Some(LadderStep::Clustering),

@@ -41,7 +41,6 @@ TRIED = {
     ("simplify", "far_part"): (0.5, 2.0),
     ("prisms", "cells"): (1 << 18, 1 << 22),
     ("prisms", "triangles_per_body"): (8, 24),
-    ("prisms", "sure"): (0.0, 8.0),
     ("prisms", "resolution"): (3.0, 8.0),
     ("prisms", "gap"): (1.0, 3.0),
     ("prisms", "footprint_penalty"): (3.0, 30.0),

@@ -22,7 +22,6 @@ from common import (
 # The names that examples/build_with.rs knows, and what build.json calls them.
 STEPS = {
     "collapse": "edge collapse within texture seams",
-    "permissive": "edge collapse across texture seams",
     "prune": "edge collapse without the smallest separate parts",
     "oriented": "edge collapse of faces turned one way",
     "clustering": "vertex clustering",

@@ -199,10 +199,8 @@ impl Default for SimplifyConstants {
 pub struct PrismConstants {
     /// Of the grid over a node's bodies at most, 0 or more; 0: there are no prisms.
     pub cells: usize,
-    /// Prisms pay where the budget leaves fewer triangles than this to a body, 0 or more.
+    /// Bodies become prisms where the budget leaves fewer triangles than this to each, 0 or more.
     pub triangles_per_body: usize,
-    /// Where it leaves fewer than this, nothing else is tried, 0 or more.
-    pub sure: f64,
     /// Cells along the side of a square as large as the footprints have for each triangle, over 0.
     pub resolution: f64,
     /// Gaps may be filled that are at most so many times as wide as that square, 0 or more.
@@ -231,8 +229,7 @@ impl Default for PrismConstants {
     fn default() -> Self {
         Self {
             cells: 1 << 20,
-            triangles_per_body: 16,
-            sure: 4.0,
+            triangles_per_body: 12,
             resolution: 5.0,
             gap: 2.0,
             footprint_penalty: 10.0,
@@ -263,7 +260,7 @@ pub struct OutlineConstants {
 
 impl Default for OutlineConstants {
     fn default() -> Self {
-        Self { least_kept: 0.9, exponent: 1.25, most_triangles: 0.9, cells: 256 }
+        Self { least_kept: 0.88, exponent: 1.25, most_triangles: 0.9, cells: 256 }
     }
 }
 

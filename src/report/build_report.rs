@@ -313,8 +313,8 @@ pub struct OverBudget {
     pub reason: String,
 }
 
-/// A coarse node that is not written, since it would keep less than nine tenths of the ground that
-/// its source covers, or of its skyline, even with almost as many triangles as those below it. These
+/// A coarse node that is not written, since it would keep less than 88 % of the ground that its
+/// source covers, or of its skyline, even with almost as many triangles as those below it. These
 /// stand in its place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SkippedNodeReport {

@@ -27,6 +27,7 @@ pub use self::mean::MeanDistance;
 pub use self::nearest::NearestTriangle;
 pub use self::one_sided_hausdorff::TIGHTNESS;
 use self::one_sided_hausdorff::{MaxDistance, OneSidedHausdorff, seed};
+pub use self::samples::point_of;
 use self::searchable_surface::Search;
 pub use self::searchable_surface::{Face, SearchableSurface};
 pub use self::stored::SurfaceError;

@@ -31,9 +31,7 @@ impl Samples {
         for triangle in lanes() {
             passed += triangle.area();
             while (points.len() as f64 + 0.5) * step < passed && points.len() < count {
-                let [u, v] = spread(points.len());
-                let [a, b, c] = triangle.corners();
-                points.push(a + (b - a) * u + (c - a) * v);
+                points.push(point_of(triangle.corners(), points.len()));
             }
         }
         Self { points, area }
@@ -65,6 +63,12 @@ impl SearchableSurface {
         }
         chosen
     }
+}
+
+/// A point of a triangle: with successive numbers, points fill it evenly.
+pub fn point_of([a, b, c]: [Vec3; 3], number: usize) -> Vec3 {
+    let [u, v] = spread(number);
+    a + (b - a) * u + (c - a) * v
 }
 
 /// Barycentric coordinates that fill a triangle evenly one after the other: the additive

@@ -125,8 +125,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             })
             .collect();
         let all_leaves = children.iter().all(|(_, plan)| *plan == NodePlan::Leaf);
-        let from_original = all_leaves || has_many_bodies(&mesh, budget, &self.bodies());
-        if from_original {
+        if all_leaves {
             let from_original = || {
                 let source = self.original(mesh, border, stitches, moved, &node);
                 self.coarse_node(source, node)
@@ -137,11 +136,20 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             let below = built.into_iter().map(|built| built.forest);
             return Ok(Built { forest: outcome.above(below), surface: Some(surface) });
         }
-        drop((mesh, border, stitches));
+        let original =
+            has_many_bodies(&mesh, budget, &self.bodies()).then_some((mesh, border, stitches));
         let built = self.children(children, child_path, parallel, true)?;
         let (below, surfaces): (Vec<_>, Vec<_>) =
             built.into_iter().map(|built| (built.forest, built.surface)).unzip();
-        let source = join(surfaces.into_iter().flatten().collect(), path.len());
+        let surfaces: Vec<NodeSurface> = surfaces.into_iter().flatten().collect();
+        let source = match original {
+            // Prisms of prisms would be poor ones.
+            Some((mesh, border, stitches)) => {
+                let below = surfaces.into_iter().map(|surface| surface.below).collect();
+                self.over(mesh, border, stitches, Below::join(below), &node)
+            }
+            None => join(surfaces, path.len()),
+        };
         let (outcome, surface) = self.coarse_node(source, node)?;
         Ok(Built { forest: outcome.above(below), surface: Some(surface) })
     }
@@ -195,15 +203,28 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
     /// measured to the original alone.
     fn original(
         &self,
-        mut mesh: Mesh,
+        mesh: Mesh,
         border: Border,
-        mut stitches: Vec<[u32; 3]>,
+        stitches: Vec<[u32; 3]>,
         moved: f64,
         node: &CoarseNode,
     ) -> NodeSurface {
         let constants = self.options.constants.measure;
         let of_mesh = || SearchableSurface::of(&source_of(&mesh, &stitches), constants);
         let below = Below::source(self.stages.time(Stage::Measure, of_mesh), moved);
+        self.over(mesh, border, stitches, below, node)
+    }
+
+    /// A chunk of the original, with its stitches, as what a node is simplified from that is measured against
+    /// `below`.
+    fn over(
+        &self,
+        mut mesh: Mesh,
+        border: Border,
+        mut stitches: Vec<[u32; 3]>,
+        below: Below,
+        node: &CoarseNode,
+    ) -> NodeSurface {
         mesh.triangles.append(&mut stitches);
         let spans = match self.options.borders {
             BorderMode::Skirts => original_spans(&mesh, &border, node.path),

@@ -5,11 +5,12 @@ use crate::builder::constants::OutlineConstants;
 use crate::builder::error::SearchableSurface;
 use crate::mesh::{Mesh, Outline, OutlineCoverage, OutlineFrame, UpAxis};
 
-/// How many times the triangles the next attempt has, at least: fewer change too little to be worth
-/// one.
-const LEAST_MORE: f64 = 1.15;
+/// The next attempt has so many triangles that this share of the loss that is allowed is expected: the
+/// guess is rough, and an attempt costs more than a few triangles.
+const EXPECTED: f64 = 5.0 / 6.0;
 
-/// And at most: a guess is worth little so far off.
+/// No attempt has more than this many times the triangles of the one before: a guess is worth little so
+/// far off.
 const MOST_MORE: f64 = 2.0;
 
 /// A coarse node that is not written, since it would keep too little of the outline of its source:
@@ -27,9 +28,9 @@ pub struct SkippedNode {
 /// How many times the triangles a node needs that keeps too small a share of the outline, by a law
 /// that holds roughly for houses.
 pub(super) fn more_triangles(kept: f64, constants: &OutlineConstants) -> f64 {
-    let excess = (1.0 - kept) / (1.0 - constants.least_kept).max(f64::MIN_POSITIVE);
+    let expected = EXPECTED * (1.0 - constants.least_kept).max(f64::MIN_POSITIVE);
     // libm's, which is alike on all machines.
-    libm::pow(excess, constants.exponent).clamp(LEAST_MORE, MOST_MORE)
+    libm::pow((1.0 - kept) / expected, constants.exponent).min(MOST_MORE)
 }
 
 /// The outline of what a node stands for.

@@ -1,13 +1,12 @@
 //! One run of edge collapse, by meshoptimizer: what it is given and what is made of its result.
 
 use meshopt::{SimplifyOptions, SimplifyVertex};
-use rustc_hash::FxHashMap;
 
 use crate::builder::border::vertex::Border;
 use crate::builder::simplify::compact::compact;
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::builder::simplify::split_mixed::split_mixed_triangles;
-use crate::mesh::{Mesh, PositionKey, key};
+use crate::mesh::Mesh;
 
 /// Weights of the appearance against the geometry.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +42,7 @@ pub(super) fn collapse(
     let far = far_out(mesh);
     move_texcoords(&mut attributes, attribute_weights.len(), far.map(|at| -at));
     let stride = attribute_weights.len() * size_of::<f32>();
-    let mut locks: Vec<SimplifyVertex> = locked
+    let locks: Vec<SimplifyVertex> = locked
         .iter()
         .map(|&locked| if locked { SimplifyVertex::Lock } else { SimplifyVertex::None })
         .collect();
@@ -53,9 +52,6 @@ pub(super) fn collapse(
     }
     if step != LadderStep::Collapse {
         options |= SimplifyOptions::Permissive;
-    }
-    if step == LadderStep::Permissive {
-        protect_material_borders(mesh, &mut locks);
     }
     if step == LadderStep::Prune {
         options |= SimplifyOptions::Prune;
@@ -212,21 +208,6 @@ fn extent_of(mesh: &Mesh) -> f32 {
     mesh.bounds()
         .map_or(1.0, |(low, high)| (0..3).map(|i| high[i] - low[i]).fold(0.0, f32::max))
         .max(f32::MIN_POSITIVE)
-}
-
-/// Marks the vertices at which two materials meet.
-fn protect_material_borders(mesh: &Mesh, locks: &mut [SimplifyVertex]) {
-    let mut first: FxHashMap<PositionKey<f32>, (u32, bool)> = FxHashMap::default();
-    for (vertex, &position) in mesh.positions.iter().enumerate() {
-        let material = mesh.materials[vertex];
-        let entry = first.entry(key(position)).or_insert((material, false));
-        entry.1 |= entry.0 != material;
-    }
-    for (vertex, lock) in locks.iter_mut().enumerate() {
-        if first[&key(mesh.positions[vertex])].1 {
-            *lock |= SimplifyVertex::Protect;
-        }
-    }
 }
 
 #[cfg(test)]

@@ -11,11 +11,14 @@ use glam::Vec3;
 use rustc_hash::FxHashMap;
 
 use crate::builder::border::skirt::Skirt;
-use crate::builder::error::{Face, NearestTriangle, SearchableSurface};
+use crate::builder::error::{Face, NearestTriangle, SearchableSurface, point_of};
 use crate::mesh::Mesh;
 
-/// Points of the original that vote, for each coarse triangle, about.
-const POINTS: f64 = 32.0;
+/// Points of the original that vote for each coarse triangle on average, if both have the same area.
+const POINTS: f64 = 8.0;
+
+/// The most points for each on average, where the original has many times the area: rooms behind walls.
+const MOST_POINTS: f64 = 64.0;
 
 /// What does not face the way of a triangle counts for so much, where nothing does.
 const ASIDE: f64 = 0.01;
@@ -73,7 +76,8 @@ pub fn with_face_colors(
     Some((painted, skirts.iter().map(of_edge).collect()))
 }
 
-/// By triangle, the area of the original of each look that is nearest to it and faces its way.
+/// By triangle, the points of the original of each colour that are nearest to it, each by how much it faces its
+/// way.
 fn votes(mesh: &Mesh, original: &SearchableSurface) -> Option<Vec<BTreeMap<Face, f64>>> {
     if mesh.colors.is_empty() {
         return None;
@@ -86,16 +90,19 @@ fn votes(mesh: &Mesh, original: &SearchableSurface) -> Option<Vec<BTreeMap<Face,
         return None;
     }
     let area: f64 = original.faces()?.map(|(_, area, _)| area).sum();
-    let share = area / (POINTS * mesh.triangles.len() as f64);
+    let points = (POINTS * area / mesh.area()).clamp(POINTS, MOST_POINTS);
+    let share = area / (points * mesh.triangles.len() as f64);
     let corners = |triangle: &[u32; 3]| triangle.map(|v| Vec3::from(mesh.positions[v as usize]));
     let normals: Vec<Vec3> = mesh.triangles.iter().map(|t| normal(corners(t))).collect();
+    let (mut passed, mut number) = (0.0, 0);
     for (corners, area, face) in original.faces()? {
-        let side = ((area / share).sqrt().ceil() as usize).clamp(1, 64);
-        let (own, each) = (normal(corners), area / (side * side) as f64);
-        for point in points(corners, side) {
-            let triangle = nearest(point) as usize;
+        passed += area;
+        let own = normal(corners);
+        while (number as f64 + 0.5) * share < passed {
+            let triangle = nearest(point_of(corners, number)) as usize;
             let facing = f64::from(own.dot(normals[triangle]).max(0.0));
-            *votes[triangle].entry(face).or_insert(0.0) += each * (facing * facing).max(ASIDE);
+            *votes[triangle].entry(face).or_insert(0.0) += (facing * facing).max(ASIDE);
+            number += 1;
         }
     }
     Some(votes)
@@ -104,17 +111,6 @@ fn votes(mesh: &Mesh, original: &SearchableSurface) -> Option<Vec<BTreeMap<Face,
 /// Of unit length; zero where a triangle has no area.
 fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
     (b - a).cross(c - a).normalize_or_zero()
-}
-
-/// The centres of the triangles into which one is divided, `side` along each edge.
-fn points([a, b, c]: [Vec3; 3], side: usize) -> impl Iterator<Item = Vec3> {
-    let at = move |u: f32, v: f32| a + (b - a) * (u / side as f32) + (c - a) * (v / side as f32);
-    (0..side).flat_map(move |row| {
-        (0..2 * (side - row) - 1).map(move |place| {
-            let third = if place % 2 == 0 { 1.0 / 3.0 } else { 2.0 / 3.0 };
-            at((place / 2) as f32 + third, row as f32 + third)
-        })
-    })
 }
 
 #[cfg(test)]
@@ -236,17 +232,5 @@ mod tests {
         let plain = Mesh { colors: Vec::new(), ..sheet(4, |_| RED) };
         let uncolored = Mesh { colors: Vec::new(), ..coarse() };
         assert!(with_face_colors(&uncolored, &[], &original(&plain)).is_none());
-    }
-
-    #[test]
-    fn points_divide_a_triangle_evenly() {
-        let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
-        for side in [1, 2, 5] {
-            let all: Vec<Vec3> = points(corners, side).collect();
-            assert_eq!(all.len(), side * side);
-            let middle = all.iter().sum::<Vec3>() / all.len() as f32;
-            assert!(middle.distance(Vec3::new(1.0, 1.0, 0.0) / 3.0) < 1e-5);
-            assert!(all.iter().all(|p| p.x > 0.0 && p.y > 0.0 && p.x + p.y < 1.0));
-        }
     }
 }

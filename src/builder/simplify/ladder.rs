@@ -1,19 +1,15 @@
 //! Simplification of a node to its triangle budget, by methods that change ever more.
 //!
-//! 1. Quadric edge collapse with attributes (Garland & Heckbert as meshoptimizer has it, with
+//! 1. Extruded footprints (`crate::builder::simplify::aggregate`), where the mesh has so many separate
+//!    bodies that the budget leaves few triangles to each.
+//! 2. Elsewhere quadric edge collapse with attributes (Garland & Heckbert as meshoptimizer has it, with
 //!    vertex positions and attributes solved for afterwards), inside texture seams.
-//! 2. The same, allowed to collapse across texture seams but not across material borders.
 //! 3. Where that misses the budget, or moves the surface far for the triangles that it leaves,
 //!    whichever of these and it is measured to stay nearest to the input on average:
-//!    - the same, across material borders too, and leaving out the smallest separate parts; triangles
-//!      then get one material each again ([`crate::builder::simplify::split_mixed`]);
-//!    - the first, of faces with a consistent winding ([`crate::builder::simplify::orient`]);
+//!    - the same, across seams and material borders, and leaving out the smallest separate parts;
+//!      triangles then get one material each again ([`crate::builder::simplify::split_mixed`]);
+//!    - the second, of faces with a consistent winding ([`crate::builder::simplify::orient`]);
 //!    - vertex clustering ([`crate::builder::simplify::cluster`]), which has no topology to respect.
-//!
-//! Extruded footprints (`crate::builder::simplify::aggregate`) are compared with these results, by the
-//! same measure, if the mesh has many separate components and the budget leaves few triangles to each. If
-//! it leaves so few that no other method would keep the components, footprints are used without a
-//! comparison.
 //!
 //! Border vertices that the level keeps are locked throughout.
 
@@ -23,7 +19,7 @@ use std::cmp::Ordering;
 use crate::builder::border::vertex::{Border, BorderVertexState, Path};
 use crate::builder::constants::Constants;
 use crate::builder::error::MeanDistance;
-use crate::builder::simplify::aggregate::{ComponentRules, Components, Extruded, without_floors};
+use crate::builder::simplify::aggregate::{ComponentRules, Components, Extruded};
 use crate::builder::simplify::cluster::cluster;
 pub use crate::builder::simplify::collapse::AppearanceWeights;
 use crate::builder::simplify::collapse::collapse;
@@ -89,8 +85,6 @@ pub struct Ladder<'a> {
     /// The mesh with a consistent winding; `None` if it had one before.
     oriented: OnceCell<Option<Mesh>>,
     distance: OnceCell<MeanDistance>,
-    /// This measures from what is seen of the source: floors are left out, since prisms have none.
-    distance_seen: OnceCell<MeanDistance>,
 }
 
 impl<'a> Ladder<'a> {
@@ -111,7 +105,6 @@ impl<'a> Ladder<'a> {
             is_one_sheet: OnceCell::new(),
             oriented: OnceCell::new(),
             distance: OnceCell::new(),
-            distance_seen: OnceCell::new(),
         }
     }
 
@@ -142,21 +135,12 @@ impl<'a> Ladder<'a> {
     /// The result of the ladder's steps that is nearest to the source.
     fn nearest(&self, target: usize, limit: usize) -> Simplified {
         let Self { source, locked, method, .. } = self;
-        let &Method { up, constants, .. } = method;
-        let mut prisms = None;
-        if let Some((extruded, is_sure)) = self.extruded(target) {
-            if is_sure && extruded.mesh.triangles.len() <= limit {
-                return extruded;
-            }
-            prisms = Some(extruded);
+        let constants = method.constants;
+        let prisms = self.extruded(target);
+        if let Some(prisms) = prisms.filter(|prisms| prisms.mesh.triangles.len() <= limit) {
+            return prisms;
         }
-        let mut best = self.collapsed(&source.mesh, target, LadderStep::Collapse);
-        if best.mesh.triangles.len() > limit && self.tries(LadderStep::Permissive) {
-            let permissive = self.collapsed(&source.mesh, target, LadderStep::Permissive);
-            if permissive.mesh.triangles.len() < best.mesh.triangles.len() {
-                best = permissive;
-            }
-        }
+        let best = self.collapsed(&source.mesh, target, LadderStep::Collapse);
         let target_edge = target_edge(&source.mesh, target);
         let rules = &constants.simplify;
         let has_duplicate_faces = || has_duplicate_faces(&source.mesh, rules.few_faces);
@@ -176,20 +160,12 @@ impl<'a> Ladder<'a> {
                 candidates.extend(self.collapsed_with_set_winding(target));
             }
         }
-        let has_prisms = prisms.is_some();
-        candidates.extend(prisms);
         if candidates.is_empty() {
             return best;
         }
         let rank = |candidate: &Simplified, best: (Rank, f64)| {
             let nearest = if best.0 == Rank::WithinBudget { best.1 } else { f64::INFINITY };
             let distance = || {
-                if has_prisms {
-                    let seen = || without_floors(&source.mesh, up);
-                    let from = || MeanDistance::from(&seen(), constants.measure);
-                    let from = self.distance_seen.get_or_init(from);
-                    return from.to(&without_floors(&candidate.mesh, up), nearest);
-                }
                 let from = || MeanDistance::from(&source.mesh, constants.measure);
                 self.distance.get_or_init(from).to(&candidate.mesh, nearest)
             };
@@ -207,17 +183,18 @@ impl<'a> Ladder<'a> {
         best.1
     }
 
-    /// Extruded bodies with the rest simplified by edge collapse, and whether there are so few triangles for
-    /// each body that nothing else is worth a try.
-    fn extruded(&self, target: usize) -> Option<(Simplified, bool)> {
+    /// Extruded bodies with the rest simplified by edge collapse; `None` where there are few bodies.
+    fn extruded(&self, target: usize) -> Option<Simplified> {
         let Self { source, locked, method, .. } = self;
         if !self.tries(LadderStep::Prisms) {
             return None;
         }
         let rules = method.bodies();
         let bodies = self.bodies.get_or_init(|| Components::of(&source.mesh, locked, &rules));
-        let Extruded { prisms, rest, triangles_per_body } =
-            bodies.extruded(&source.mesh, target, &rules)?;
+        if !bodies.are_many(target, &rules) {
+            return None;
+        }
+        let Extruded { prisms, rest } = bodies.extruded(&source.mesh, target, &rules)?;
         let step = LadderStep::Prisms;
         let for_rest = target.saturating_sub(prisms.triangles.len()).max(1);
         let rest = Mesh { triangles: rest.to_vec(), ..source.mesh.clone() };
@@ -230,7 +207,7 @@ impl<'a> Ladder<'a> {
         };
         let border = Border::interior(prisms.positions.len());
         result.append(prisms, border);
-        Some((result, triangles_per_body < method.constants.prisms.sure))
+        Some(result)
     }
 
     /// Edge collapse after duplicate faces are removed and all have a consistent winding; `None` where this

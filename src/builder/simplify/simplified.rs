@@ -44,8 +44,6 @@ pub enum LadderStep {
     Original,
     /// Edge collapse inside texture seams.
     Collapse,
-    /// Edge collapse across texture seams.
-    Permissive,
     /// Edge collapse across texture seams and material borders, with the smallest separate parts left out.
     Prune,
     /// Edge collapse across texture seams and material borders of faces that wind one way.
@@ -64,7 +62,6 @@ impl LadderStep {
         match self {
             Self::Original => "original geometry",
             Self::Collapse => "edge collapse within texture seams",
-            Self::Permissive => "edge collapse across texture seams",
             Self::Prune => "edge collapse without the smallest separate parts",
             Self::Oriented => "edge collapse of faces turned one way",
             Self::Clustering => "vertex clustering",

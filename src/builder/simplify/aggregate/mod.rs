@@ -11,13 +11,11 @@
 
 mod appearance;
 mod extrudable;
-mod floors;
 mod prisms;
 
 use std::cell::OnceCell;
 
 pub use self::extrudable::Extrudable;
-pub use self::floors::without_floors;
 use self::prisms::{Body, Footprints};
 use crate::builder::constants::PrismConstants;
 use crate::builder::simplify::parts::{Part, parts};
@@ -66,14 +64,16 @@ pub struct Extruded<'a> {
     pub prisms: Mesh,
     /// The triangles of the mesh that they do not stand for.
     pub rest: &'a [[u32; 3]],
-    /// How many triangles there are for each body that they stand for.
-    pub triangles_per_body: f64,
 }
 
-/// Whether a mesh has so many separate bodies that prisms may be better than edge collapse for a
-/// node with so many triangles.
+/// Tells whether a mesh has so many separate bodies that a node with so many triangles has prisms for
+/// them.
 pub fn has_many_bodies(mesh: &Mesh, target: usize, rules: &ComponentRules) -> bool {
-    rules.count(mesh) * rules.constants.triangles_per_body > target
+    are_many(rules.count(mesh), target, rules)
+}
+
+fn are_many(bodies: usize, target: usize, rules: &ComponentRules) -> bool {
+    bodies * rules.constants.triangles_per_body > target
 }
 
 /// Prisms are made of so many triangles at least: those of a box, without its floor.
@@ -110,9 +110,14 @@ impl Components {
         Self { bodies, rest, share: in_bodies / area, footprints: OnceCell::new() }
     }
 
+    /// Tells whether prisms stand for them in a node with so many triangles.
+    pub fn are_many(&self, target: usize, rules: &ComponentRules) -> bool {
+        are_many(self.bodies.len(), target, rules)
+    }
+
     /// Replaces all of them by prisms, so that about `target` triangles are left for the whole mesh, by
-    /// the same rules, if the rest is simplified too; `None` where there are too few bodies to be worth it,
-    /// or these have too many borders for so few triangles. Further budgets use the grid of the first.
+    /// the same rules, if the rest is simplified too; `None` where there are no bodies, or these have too
+    /// many borders for so few triangles. Further budgets use the grid of the first.
     pub fn extruded(
         &self,
         mesh: &Mesh,
@@ -120,17 +125,16 @@ impl Components {
         rules: &ComponentRules,
     ) -> Option<Extruded<'_>> {
         let Self { bodies, rest, share, footprints } = self;
-        if bodies.len() * rules.constants.triangles_per_body <= target {
+        if bodies.is_empty() {
             return None;
         }
         // Prisms get the triangles that the rest does not need.
         let for_bodies = (target as f64 * share).max(target as f64 - rest.len() as f64);
-        let triangles_per_body = for_bodies / bodies.len() as f64;
         let most = (for_bodies as usize).max(LEAST_TRIANGLES);
         let made = || Footprints::of(mesh, bodies, most, rules);
         let footprints = footprints.get_or_init(made).as_ref()?;
         let prisms = footprints.prisms(mesh, bodies, most, rules)?;
-        Some(Extruded { prisms, rest, triangles_per_body })
+        Some(Extruded { prisms, rest })
     }
 }
 
@@ -219,7 +223,7 @@ mod tests {
         let kept = Components::of(&mesh, &locked, &all);
         assert_eq!(kept.extruded(&mesh, 600, &all).unwrap().rest.len(), 1 + 14);
         let free_bodies = Components::of(&mesh, &free, &all);
-        assert!(free_bodies.extruded(&mesh, 2000, &all).is_none(), "enough for all");
+        assert!(free_bodies.are_many(900, &all) && !free_bodies.are_many(1200, &all));
         constants.cells = 0;
         let none = rules(&constants);
         assert!(Components::of(&mesh, &free, &none).extruded(&mesh, 600, &none).is_none());
