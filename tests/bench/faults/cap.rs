@@ -4,7 +4,7 @@ use hlod::Error;
 use hlod::engine::policies::POLICIES;
 
 use super::rig::{Fault, Ground, SECOND, frames};
-use super::steady::{DETAIL, assert_steady};
+use super::steady::{Detail, assert_steady};
 use crate::support::Random;
 
 const FRAMES: usize = 300;
@@ -70,7 +70,7 @@ fn detail_goes_with_the_cap_and_comes_back_with_it() {
     let triangles = [95..100, 150..200, 250..300].map(|range| run.triangles(range));
     assert!(triangles[0] > triangles[1] && triangles[1] > triangles[2], "{triangles:?}");
     assert!(run.reports[100].memory_bytes > used / 4, "no more leaves than has to");
-    assert_steady("room again", &run, &undisturbed, 330, &DETAIL);
+    assert_steady("room again", &run, &undisturbed, 330, Detail::AtOnce);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use hlod::engine::policies::POLICIES;
 
 use super::rig::{Fault, Frames, Ground, SECOND, frames};
-use super::steady::{DETAIL, assert_steady};
+use super::steady::{Detail, assert_steady};
 
 /// The frame after which the clock jumps.
 const JUMP: usize = 300;
@@ -45,7 +45,7 @@ fn a_second_after_a_jump_all_is_as_before() {
         for (what, jump) in jumps() {
             let jumped = run(&ground, "gain-over-price", ROOM, jump);
             let what = format!("{} {what}", ground.name);
-            assert_steady(&what, &jumped, &undisturbed, JUMP + 1, &DETAIL);
+            assert_steady(&what, &jumped, &undisturbed, JUMP + 1, Detail::AtOnce);
         }
     }
 }

@@ -6,7 +6,7 @@ use hlod::camera::{Pose, from_angles};
 use hlod::mesh::UpAxis;
 
 use super::rig::{Fault, Ground, SECOND, frames, refused_view};
-use super::steady::{DETAIL, assert_steady};
+use super::steady::{Detail, assert_steady};
 
 /// The frame in which the camera is first there, and the one in which it is back.
 const THERE: [usize; 2] = [300, 390];
@@ -52,7 +52,7 @@ fn cameras_in_odd_places_are_steady_there_and_when_they_are_back() {
             // What was seen before is forgotten over seconds, for which a few nodes make way.
             let chosen = run.chosen(there);
             assert!(chosen <= 6, "{what}: {chosen} toggles");
-            assert_steady(&what, &run, &undisturbed, THERE[1], &DETAIL);
+            assert_steady(&what, &run, &undisturbed, THERE[1], Detail::AtOnce);
         }
     }
 }

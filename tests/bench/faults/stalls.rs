@@ -1,17 +1,15 @@
 //! Adapters that stall.
 
-use std::ops::RangeInclusive;
-
 use super::rig::{Fault, Ground, frames};
-use super::steady::{DETAIL, assert_steady};
+use super::steady::{Detail, assert_steady};
 
 /// The frame in which stalls begin, when the run has been steady for long.
 const BEGIN: usize = 300;
 
 const ROOM: u64 = 1 << 30;
 
-/// Of runs of seconds, prices are learned that hold some detail back until they are forgotten.
-const DETAIL_AFTER_SECONDS: RangeInclusive<f64> = 0.85..=1.1;
+/// Of more stalls in a row, prices are learned that hold some detail back until they are forgotten.
+const FEW: usize = 5;
 
 /// How many frames stall, and milliseconds of each.
 const STALLS: [(usize, f64); 8] = [
@@ -37,8 +35,8 @@ fn stalls_pass(ground: &Ground, policy: &str, is_walking: bool) {
     let undisturbed = run(0, 0.0);
     for (stalls, stall_ms) in STALLS {
         let what = format!("{} {policy} {is_walking} {stalls} of {stall_ms} ms", ground.name);
-        let detail = if stalls <= 5 { DETAIL } else { DETAIL_AFTER_SECONDS };
-        assert_steady(&what, &run(stalls, stall_ms), &undisturbed, BEGIN + stalls, &detail);
+        let detail = if stalls <= FEW { Detail::AtOnce } else { Detail::InTheEnd };
+        assert_steady(&what, &run(stalls, stall_ms), &undisturbed, BEGIN + stalls, detail);
     }
 }
 
