@@ -100,8 +100,8 @@ pub struct BlockSetup<'a> {
     cache: &'a TextureCache<'a>,
     extrudable: &'a Extrudable,
     reorientable: Vec<bool>,
-    /// Tells by material whether others are seen through it.
-    see_through: Vec<bool>,
+    /// What the alpha of each material does.
+    alpha: Vec<AlphaMode>,
     hierarchy: HierarchyOptions,
 }
 
@@ -119,9 +119,8 @@ impl<'a> BlockSetup<'a> {
             hierarchy.tolerance.sliver_steps = hierarchy.tolerance.sliver_steps.min(1.0);
         }
         let reorientable = cache.model().materials.iter().map(reorientable).collect();
-        let blends = |material: &Material| material.alpha == AlphaMode::Blend;
-        let see_through = cache.model().materials.iter().map(blends).collect();
-        Self { target, up, cache, extrudable, reorientable, see_through, hierarchy }
+        let alpha = cache.model().materials.iter().map(|material| material.alpha).collect();
+        Self { target, up, cache, extrudable, reorientable, alpha, hierarchy }
     }
 
     /// Returns where nodes are written.
@@ -183,7 +182,8 @@ impl<'a> BlockSetup<'a> {
             quantization: options.quantization(),
             up: self.up,
             reorientable: &self.reorientable,
-            see_through: &self.see_through,
+            alpha: &self.alpha,
+            repeats: sink.textures.repeats(),
             extrudable: self.extrudable,
             sink,
             stages,

@@ -15,7 +15,7 @@ use super::plan::{self, TextureUse};
 use super::raster::{self, Rasterizer};
 use super::shared::SharedTextures;
 use crate::decode::DecodedTexture;
-use crate::mesh::{Mesh, Model};
+use crate::mesh::{Material, Mesh, Model, Wrap};
 use crate::stage_timer::StageTimer;
 
 /// What of the texture work can be chosen.
@@ -208,6 +208,15 @@ impl<'a> BlockTextures<'a> {
     /// cut up.
     pub fn used_texels(&self) -> u64 {
         self.used_texels
+    }
+
+    /// Tells by material whether its image can be shown several times side by side: it repeats and is not cut up.
+    pub fn repeats(&self) -> Vec<bool> {
+        let repeats = |(number, material): (u32, &Material)| {
+            let is_whole = matches!(self.image_of_material(number), Some(Prepared::Repeating(_)));
+            is_whole && material.wrap == [Wrap::Repeat; 2]
+        };
+        (0..).zip(&self.model.materials).map(repeats).collect()
     }
 
     /// The textures that are kept whole: a hash of each image, and its texels.

@@ -22,6 +22,7 @@ mod border;
 mod cells;
 mod color_regions;
 mod coverage;
+mod cut_outs;
 mod cut_planes;
 mod distance;
 mod distance_stats;
@@ -75,6 +76,7 @@ use outlines::Outlines;
 use points::Points;
 use source::Source;
 
+use self::cut_outs::CutOuts;
 use crate::format::{SCENE_FILE, Scene};
 use crate::lattice::Quantization;
 use crate::mesh::OutlineCoverage;
@@ -272,6 +274,7 @@ impl Verification<'_> {
         let diagonal = report.scene.as_ref().map_or(0.0, |facts| facts.diagonal);
         let mut all: Vec<NodeDistances> = Vec::new();
         let outlines = Outlines::of(scene.up, leaves, geometry);
+        let cut_outs = CutOuts::of(geometry, images, options.seed);
         let kept = |front: &Front| {
             let nodes: Vec<u32> = front.nodes().collect();
             outlines
@@ -295,8 +298,16 @@ impl Verification<'_> {
             let figures = self.level_figures(front, level, geometry, &distances, diagonal);
             let kept = kept(front);
             let other_color_share = regions.wrong_share();
-            let figures =
-                LevelFigures { kept, color_rms, color_share, other_color_share, tiles, ..figures };
+            let cut_outs_kept = cut_outs.share(front.nodes(), leaves.iter().copied());
+            let figures = LevelFigures {
+                kept,
+                color_rms,
+                color_share,
+                other_color_share,
+                cut_outs_kept,
+                tiles,
+                ..figures
+            };
             (figures, distances.nodes, regions)
         };
         let mut regions = Vec::new();

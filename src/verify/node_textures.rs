@@ -8,7 +8,7 @@ use crate::decode::{DecodedTexture, decode_texture};
 use crate::format::{
     NODES_DIR, NodeImageData, NodeMesh, Scene, TEXTURES_DIR, read_glb, read_regular,
 };
-use crate::mesh::{TextureData, TextureSource};
+use crate::mesh::{AlphaMode, TextureData, TextureSource};
 
 /// Decodes images of nodes. Those that nodes share are decoded once and kept; a node's own only
 /// while it is looked at.
@@ -63,6 +63,24 @@ impl<'a> NodeTextures<'a> {
                 appearance.color(Some(image.as_ref()?))
             })
             .collect()
+    }
+
+    /// The numbers of the triangles of a node whose material has cut-outs, ascending; none where the node cannot be
+    /// read.
+    pub fn cut_out(&self, node: u32) -> Vec<u32> {
+        let file = &self.scene.nodes[node as usize].file;
+        let bytes = read_regular(&self.out.join(NODES_DIR).join(file)).ok();
+        let mesh = bytes.and_then(|bytes| read_glb(&bytes, Path::new(file)).ok());
+        let mut numbers = Vec::new();
+        let mut first = 0;
+        for primitive in mesh.iter().flat_map(|mesh| &mesh.primitives) {
+            let end = first + primitive.indices.len() as u32 / 3;
+            if matches!(primitive.surface.alpha, AlphaMode::Mask { .. }) {
+                numbers.extend(first..end);
+            }
+            first = end;
+        }
+        numbers
     }
 }
 

@@ -207,6 +207,9 @@ pub struct LevelFigures {
     /// 255 in some channel, 0–1: the mean over regions as large as the node's error, or larger where
     /// samples are few. `None` where nothing could be compared.
     pub other_color_share: Option<f64>,
+    /// The visible area of surfaces with cut-outs, as leaves of trees, over that of the leaves of the tree of nodes;
+    /// `None` where these have none.
+    pub cut_outs_kept: Option<f64>,
     /// Tiles of generated cities; `None` elsewhere.
     pub tiles: Option<TileFigures>,
 }

@@ -84,6 +84,18 @@ pub fn text(report: &VerifyReport) -> String {
             ));
         }
     }
+    let kept: Vec<String> = report
+        .levels
+        .iter()
+        .filter_map(|level| level.cut_outs_kept)
+        .map(|kept| percent(Some(kept)))
+        .collect();
+    if !kept.is_empty() {
+        line(format!(
+            "\nVisible area of cut-outs, as of trees, in % of that of the leaves, by level: {}",
+            kept.join(", ")
+        ));
+    }
     if !report.worst_nodes.is_empty() {
         line(format!(
             "\nWorst nodes\n{:>5} {:>10} {:>10} {:>10} {:>10}  at, file",

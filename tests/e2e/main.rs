@@ -10,6 +10,7 @@ mod cli;
 mod crash;
 mod determinism;
 mod encodings;
+mod forest;
 mod gltf_inputs;
 mod golden;
 mod groups;

@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::BlockBuilder;
 use super::node::{Forest, NodeDraft, NodeSink, Tree};
 use super::outline::{SkippedNode, SourceOutline, more_triangles};
+use super::surfaces::{Materials, NodeSurfaces};
 use crate::Result;
 use crate::builder::border::skirt::{Skirt, skirts, triangles_of};
 use crate::builder::border::skirt_rules::SkirtRules;
@@ -18,7 +19,7 @@ use crate::builder::simplify::cap::cap_sections;
 use crate::builder::simplify::compact::compact;
 use crate::builder::simplify::face_colors::with_face_colors;
 use crate::builder::simplify::fallback::fallback_triangles;
-use crate::builder::simplify::ladder::{AppearanceWeights, Ladder, Method};
+use crate::builder::simplify::ladder::{AppearanceWeights, Method};
 use crate::builder::simplify::normal_sets::{NormalSets, weld_normals};
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::builder::simplify::weld_seams::weld_seams;
@@ -83,15 +84,7 @@ struct NodeLadder<'a> {
     /// Number of skirt triangles that the thinned border needs.
     skirt_triangles: usize,
     rules: SkirtRules,
-    ladders: Vec<SurfaceLadder<'a>>,
-}
-
-/// The ladder of what hides others, or of what others are seen through: simplified as one, the larger would stand
-/// for both.
-struct SurfaceLadder<'a> {
-    ladder: Ladder<'a>,
-    /// Share of the triangles that the node may have.
-    share: f64,
+    surfaces: NodeSurfaces<'a>,
 }
 
 /// How a coarse node ends.
@@ -259,7 +252,8 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             let within_seams = ladder(mesh, border.clone(), false);
             let coarse = self.simplified(&within_seams, node, node.budget);
             let Simplified { mesh, step, .. } = &coarse.simplified;
-            reason = plan.reason(mesh, *step == LadderStep::Collapse);
+            let keeps_seams = matches!(step, LadderStep::Collapse | LadderStep::Cards);
+            reason = plan.reason(mesh, keeps_seams);
             if reason.is_none() {
                 return (within_seams, Some(coarse), None);
             }
@@ -300,49 +294,19 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
             without: self.options.without,
             constants,
         };
-        let ladders =
-            self.surface_ladders(&mesh, |mesh| Ladder::new(mesh, &border, path, at, method));
-        NodeLadder { source, mesh, border, normal_sets, spans, skirt_triangles, rules, ladders }
+        let materials = Materials { alpha: self.alpha, repeats: &self.repeats };
+        let surfaces = NodeSurfaces::new(&mesh, &border, path, at, method, materials);
+        NodeLadder { source, mesh, border, normal_sets, spans, skirt_triangles, rules, surfaces }
     }
 
-    /// The ladders of a mesh: of its solid triangles, and of those through which others are seen.
-    fn surface_ladders<'l>(
-        &self,
-        mesh: &Mesh,
-        ladder: impl Fn(&Mesh) -> Ladder<'l>,
-    ) -> Vec<SurfaceLadder<'l>> {
-        let is_see_through = |&triangle: &[u32; 3]| {
-            let material = mesh.triangle_material(triangle) as usize;
-            self.see_through.get(material).copied().unwrap_or(false)
-        };
-        let (see_through, solid): (Vec<[u32; 3]>, Vec<[u32; 3]>) =
-            mesh.triangles.iter().partition(|triangle| is_see_through(triangle));
-        if see_through.is_empty() || solid.is_empty() {
-            return vec![SurfaceLadder { ladder: ladder(mesh), share: 1.0 }];
-        }
-        let area = mesh.area();
-        let of = |triangles: Vec<[u32; 3]>| {
-            let part = Mesh { triangles, ..mesh.clone() };
-            SurfaceLadder { share: part.area() / area, ladder: ladder(&part) }
-        };
-        vec![of(solid), of(see_through)]
-    }
-
-    /// The ladders' result for a budget, with its sections capped and its skirts.
+    /// The surfaces' result for a budget, with its sections capped and its skirts.
     fn simplified(&self, with: &NodeLadder, node: &CoarseNode, budget: usize) -> Coarse {
-        let NodeLadder { source, mesh, border, normal_sets, spans, rules, ladders, .. } = with;
+        let NodeLadder { source, mesh, border, normal_sets, spans, rules, surfaces, .. } = with;
         let path = node.path;
         // Skirts count towards the budget, but may not take more than half of it.
         let target = budget.saturating_sub(with.skirt_triangles).max(budget / 2).max(1);
-        let of = |SurfaceLadder { ladder, share }: &SurfaceLadder| {
-            ladder.simplified(((target as f64 * share).round() as usize).max(1))
-        };
-        let joined = |mut one: Simplified, other| {
-            one.join(other);
-            one
-        };
         let fallback = || fallback_triangles(source, border, FALLBACK_TRIANGLES.min(target));
-        let mut result = ladders.iter().map(of).reduce(joined).unwrap_or_else(fallback);
+        let mut result = surfaces.simplified(target).unwrap_or_else(fallback);
         if self.quantization.is_some() {
             result = self.snapped(result);
         }

@@ -11,6 +11,7 @@ pub mod node;
 pub mod options;
 mod outline;
 pub mod shape;
+mod surfaces;
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -35,7 +36,7 @@ use crate::builder::simplify::merge::merge;
 use crate::builder::simplify::simplified::LadderStep;
 use crate::builder::stages::{Stage, Stages};
 use crate::lattice::{Lattice, Quantization};
-use crate::mesh::{Mesh, UpAxis, renumber};
+use crate::mesh::{AlphaMode, Mesh, UpAxis, renumber};
 use crate::texture::BakePlan;
 
 /// Chunks with more than this many times the desired triangles are divided and built in parallel.
@@ -57,8 +58,10 @@ pub struct BlockBuilder<'a, S> {
     pub up: UpAxis,
     /// Of each material, whether its faces may be reoriented ([`crate::builder::simplify::orient`]).
     pub reorientable: &'a [bool],
-    /// Tells by material whether others are seen through it.
-    pub see_through: &'a [bool],
+    /// What the alpha of each material does.
+    pub alpha: &'a [AlphaMode],
+    /// Tells by material whether its image can be shown several times side by side.
+    pub repeats: Vec<bool>,
     /// Of each material, whether prisms may have it.
     pub extrudable: &'a Extrudable,
     /// Where nodes go.

@@ -73,6 +73,14 @@ impl Method<'_> {
     }
 }
 
+/// Tells of each vertex whether it stays where it is in a node of `path` at `level`.
+pub fn locked_vertices(border: &Border, path: &Path, level: u8) -> Vec<bool> {
+    let states = border.planes.iter().zip(&border.keep);
+    states
+        .map(|(&planes, &keep)| path.state(planes, keep, level) != BorderVertexState::Free)
+        .collect()
+}
+
 /// A mesh that is simplified, to one budget or to several: what does not depend on the budget is found
 /// once.
 pub struct Ladder<'a> {
@@ -92,10 +100,7 @@ impl<'a> Ladder<'a> {
     /// `level`.
     pub fn new(mesh: &Mesh, border: &Border, path: &Path, level: u8, method: Method<'a>) -> Self {
         let (mesh, border) = compact(mesh, border);
-        let states = border.planes.iter().zip(&border.keep);
-        let locked = states
-            .map(|(&planes, &keep)| path.state(planes, keep, level) != BorderVertexState::Free)
-            .collect();
+        let locked = locked_vertices(&border, path, level);
         Self {
             source: Simplified { mesh, border, error: 0.0, step: LadderStep::Collapse },
             locked,

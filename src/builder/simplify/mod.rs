@@ -2,6 +2,7 @@
 
 pub(crate) mod aggregate;
 pub mod cap;
+pub mod cards;
 pub mod cluster;
 pub mod collapse;
 pub mod compact;

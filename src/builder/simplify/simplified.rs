@@ -26,9 +26,11 @@ impl Simplified {
 }
 
 impl Simplified {
-    /// Adds a surface that was simplified beside this one; the step is that of the larger.
+    /// Adds a surface that was simplified beside this one. The step is that of the larger; cards, which have no
+    /// seams, do not count.
     pub fn join(&mut self, other: Self) {
-        if other.mesh.triangles.len() > self.mesh.triangles.len() {
+        let is_larger = other.mesh.triangles.len() > self.mesh.triangles.len();
+        if is_larger && other.step != LadderStep::Cards {
             self.step = other.step;
         }
         self.error = self.error.max(other.error);
@@ -52,6 +54,8 @@ pub enum LadderStep {
     Clustering,
     /// Extruded footprints in place of separate bodies, and edge collapse of the rest.
     Prisms,
+    /// Fewer and larger cards of leaves.
+    Cards,
     /// The largest triangles alone, where simplification would leave nothing.
     Fallback,
 }
@@ -66,6 +70,7 @@ impl LadderStep {
             Self::Oriented => "edge collapse of faces turned one way",
             Self::Clustering => "vertex clustering",
             Self::Prisms => "extruded footprints of separate bodies",
+            Self::Cards => "fewer and larger cards",
             Self::Fallback => "the largest triangles alone",
         }
     }

@@ -1,0 +1,115 @@
+//! The surfaces of a node that are simplified apart.
+//!
+//! Simplified as one, the largest would stand for all: a glass dome for the house in it. So what hides others and
+//! what others are seen through have a ladder each, and their shares of the node's triangles by area. Leaves and
+//! other cut-outs are a part of what hides others, unless they lose their area so: then they are [`Cards`].
+
+use crate::builder::border::vertex::{Border, Path};
+use crate::builder::simplify::cards::Cards;
+use crate::builder::simplify::ladder::{Ladder, Method, locked_vertices};
+use crate::builder::simplify::simplified::Simplified;
+use crate::mesh::{AlphaMode, Mesh};
+
+/// Cut-outs that keep a smaller share of their area become cards, 0–1.
+const KEPT: f64 = 0.95;
+
+/// What materials are like, by number.
+#[derive(Clone, Copy)]
+pub(super) struct Materials<'a> {
+    /// What their alpha does.
+    pub alpha: &'a [AlphaMode],
+    /// Tells whether their image can be shown several times side by side.
+    pub repeats: &'a [bool],
+}
+
+impl Materials<'_> {
+    fn alpha(&self, material: u32) -> AlphaMode {
+        self.alpha.get(material as usize).copied().unwrap_or_default()
+    }
+
+    fn is_cut_out(&self, material: u32) -> bool {
+        matches!(self.alpha(material), AlphaMode::Mask { .. })
+    }
+
+    /// Square metres.
+    fn cut_out_area(&self, mesh: &Mesh) -> f64 {
+        let triangles = mesh.triangles.iter();
+        let cut_out = triangles.filter(|t| self.is_cut_out(mesh.triangle_material(**t)));
+        cut_out.map(|&triangle| mesh.triangle_area(triangle)).sum()
+    }
+}
+
+/// A part of a node's surface, and its share of the triangles that the node may have.
+type Shared<T> = (T, f64);
+
+/// How the surfaces of a node are simplified.
+pub(super) struct NodeSurfaces<'a> {
+    materials: Materials<'a>,
+    /// Square metres.
+    cut_out_area: f64,
+    ladders: Vec<Shared<Ladder<'a>>>,
+    /// The ladders of what is no card, and the cards; `None` where there are no cards.
+    with_cards: Option<(Vec<Shared<Ladder<'a>>>, Shared<Cards>)>,
+}
+
+impl<'a> NodeSurfaces<'a> {
+    /// Prepares a mesh whose border is thinned for a node of `path` at `level`.
+    pub fn new(
+        mesh: &Mesh,
+        border: &Border,
+        path: &Path,
+        level: u8,
+        method: Method<'a>,
+        materials: Materials<'a>,
+    ) -> Self {
+        let area = mesh.area();
+        let ladders = |triangles: &[[u32; 3]]| {
+            let is_see_through = |triangle: &[u32; 3]| {
+                materials.alpha(mesh.triangle_material(*triangle)) == AlphaMode::Blend
+            };
+            let (see_through, solid): (Vec<[u32; 3]>, Vec<[u32; 3]>) =
+                triangles.iter().partition(|triangle| is_see_through(triangle));
+            let surfaces = [solid, see_through].into_iter().filter(|all| !all.is_empty());
+            let shared = |triangles: Vec<[u32; 3]>| {
+                let is_all = triangles.len() == mesh.triangles.len();
+                let part = Mesh { triangles, ..mesh.clone() };
+                let share = if is_all { 1.0 } else { part.area() / area };
+                (Ladder::new(&part, border, path, level, method), share)
+            };
+            surfaces.map(shared).collect::<Vec<_>>()
+        };
+        let locked = locked_vertices(border, path, level);
+        let is_cut_out = |material: u32| materials.is_cut_out(material);
+        let (cards, rest) = Cards::of(mesh, border, method.up, is_cut_out, &locked);
+        let with_cards = (!cards.is_empty()).then(|| {
+            let share = if rest.is_empty() { 1.0 } else { cards.area() / area };
+            (ladders(&rest), (cards, share))
+        });
+        let cut_out_area = materials.cut_out_area(mesh);
+        Self { materials, cut_out_area, ladders: ladders(&mesh.triangles), with_cards }
+    }
+
+    /// Simplifies all of them to about `target` triangles together; `None` where there is nothing.
+    pub fn simplified(&self, target: usize) -> Option<Simplified> {
+        let share = |share: f64| ((target as f64 * share).round() as usize).max(1);
+        let joined = |ladders: &[Shared<Ladder>]| {
+            let all = ladders.iter().map(|(ladder, of_all)| ladder.simplified(share(*of_all)));
+            all.reduce(join)
+        };
+        let without_cards = joined(&self.ladders)?;
+        let Some((ladders, (cards, of_all))) = &self.with_cards else {
+            return Some(without_cards);
+        };
+        if self.materials.cut_out_area(&without_cards.mesh) >= KEPT * self.cut_out_area {
+            return Some(without_cards);
+        }
+        let repeats = |material: u32| self.materials.repeats.get(material as usize) == Some(&true);
+        let cards = cards.simplified(share(*of_all), repeats);
+        joined(ladders).into_iter().chain([cards]).reduce(join)
+    }
+}
+
+fn join(mut one: Simplified, other: Simplified) -> Simplified {
+    one.join(other);
+    one
+}
