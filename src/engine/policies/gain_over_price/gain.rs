@@ -7,6 +7,10 @@ use crate::runtime::SceneTree;
 /// What was seen of a node is half forgotten after so many seconds.
 const HALF_LIFE_S: f64 = 5.0;
 
+/// Children that are no better than their parent gain this share of how wrong it is: what is below them may be better,
+/// and would never be drawn otherwise, however much time there is.
+const LEAST: f64 = 0.01;
+
 /// How large nodes were seen, of late.
 ///
 /// What is seen of a node changes with every turn of the camera, at the picture's edges most. So that
@@ -78,12 +82,13 @@ impl Gain {
     }
 }
 
-/// How much less wrong each pixel of a node is by its children.
+/// How much less wrong each pixel of a node is by its children, and at least [`LEAST`] of how wrong it is.
 pub(in crate::engine) fn removed(tree: &SceneTree, node: u32, per_metre: f64) -> f64 {
     let (at, children) = (tree.node(node), tree.child_nodes(node));
     let wrong = |error: f64| (error * per_metre).sqrt();
     let errors = children.iter().map(|child| wrong(child.mean_error));
-    (wrong(at.mean_error) - errors.sum::<f64>() / children.len().max(1) as f64).max(0.0)
+    let own = wrong(at.mean_error);
+    (own - errors.sum::<f64>() / children.len().max(1) as f64).max(LEAST * own)
 }
 
 /// The part of the picture in which a node is seen now, 0 to 1.

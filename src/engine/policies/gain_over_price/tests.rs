@@ -34,6 +34,16 @@ fn the_highest_gain_for_its_price_comes_first_and_no_time_is_left_that_another_f
 }
 
 #[test]
+fn what_is_below_children_that_are_no_better_is_drawn_where_there_is_time() {
+    let at = [10.0, 0.0, 0.0];
+    let node = |error: f64, children| Sketch { error, ..sketch(at, 1.0, children) };
+    let child = || node(0.1, vec![node(0.0, vec![]), node(0.0, vec![])]);
+    let mut frame = TestFrame::new(tree(vec![node(0.1, vec![child(), child()])]));
+    frame.target_ms = 100.0;
+    assert_eq!(settled(&frame, &mut *policy(&[])), [2, 3, 5, 6]);
+}
+
+#[test]
 fn a_frame_that_would_be_late_is_relieved_at_once_and_detail_returns_later() {
     let mut frame = TestFrame::new(tree(vec![root(10.0, 0.1, 2), root(11.0, 0.1, 2)]));
     let mut policy = policy(&[("dwell_s", 0.5)]);
