@@ -84,16 +84,7 @@ fn specks_change_nothing() {
         "needles of 10 m, aspect 1e6",
         hills_with(|place, [along, across]| [place, place + along * 10.0, place + across * 1e-5]),
         &sound_long,
-        &[
-            ("RMS", 0.1),
-            ("triangles, level", 0.03),
-            ("triangles drawn", 0.03),
-            ("nodes", 0.05),
-            ("stored", 0.75),
-            // 67 of 75, where twins differ by 4.5 %: what did not fit is tried again after half a second,
-            // and the last percent of the budget decides each time. Within 4.5 % where it rests for 16 s.
-            ("toggles", 0.12),
-        ],
+        thin,
         "wide ones keep some of the budget, so that other levels fit",
     );
     check(
