@@ -36,7 +36,7 @@ const LEAST_PART: f64 = 0.25;
 const SPARSE: [&str; 2] = ["lyon_roads", "wageningen"];
 /// The part of the pictures of a path that may show less there, and what these show at least.
 const SPARSE_FEW: f64 = 0.02;
-const SPARSE_LEAST_PART: f64 = 0.2;
+const SPARSE_LEAST_PART: f64 = 0.15;
 /// Sets in which much is hidden: of the others little is, or of some paths only.
 const HIDING: [&str; 2] = ["hamada", "wageningen"];
 /// Of so many frames one is drawn.
