@@ -100,7 +100,7 @@ pub struct BlockSetup<'a> {
     cache: &'a TextureCache<'a>,
     extrudable: &'a Extrudable,
     reorientable: Vec<bool>,
-    /// What the alpha of each material does.
+    /// The alpha mode of each material.
     alpha: Vec<AlphaMode>,
     hierarchy: HierarchyOptions,
 }

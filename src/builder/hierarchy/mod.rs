@@ -58,7 +58,7 @@ pub struct BlockBuilder<'a, S> {
     pub up: UpAxis,
     /// Of each material, whether its faces may be reoriented ([`crate::builder::simplify::orient`]).
     pub reorientable: &'a [bool],
-    /// What the alpha of each material does.
+    /// The alpha mode of each material.
     pub alpha: &'a [AlphaMode],
     /// Tells by material whether its image can be shown several times side by side.
     pub repeats: Vec<bool>,

@@ -1,8 +1,8 @@
 //! The surfaces of a node that are simplified apart.
 //!
-//! Simplified as one, the largest would stand for all: a glass dome for the house in it. So what hides others and
-//! what others are seen through have a ladder each, and their shares of the node's triangles by area. Leaves and
-//! other cut-outs are a part of what hides others, unless they lose their area so: then they are [`Cards`].
+//! If they were simplified as one, the largest would stand for all: a glass dome for the house in it. So opaque and
+//! blended triangles have a ladder each, and their shares of the node's triangles by area. Cut-outs, as leaves, are
+//! simplified with the opaque triangles. If they lose their area by that, they become [`Cards`].
 
 use crate::builder::border::vertex::{Border, Path};
 use crate::builder::simplify::cards::Cards;
@@ -13,10 +13,10 @@ use crate::mesh::{AlphaMode, Mesh};
 /// Cut-outs that keep a smaller share of their area become cards, 0–1.
 const KEPT: f64 = 0.95;
 
-/// What materials are like, by number.
+/// The properties of materials that decide how their surfaces are simplified, by material.
 #[derive(Clone, Copy)]
 pub(super) struct Materials<'a> {
-    /// What their alpha does.
+    /// Their alpha modes.
     pub alpha: &'a [AlphaMode],
     /// Tells whether their image can be shown several times side by side.
     pub repeats: &'a [bool],
@@ -42,7 +42,7 @@ impl Materials<'_> {
 /// A part of a node's surface, and its share of the triangles that the node may have.
 type Shared<T> = (T, f64);
 
-/// How the surfaces of a node are simplified.
+/// The ladders of a node's surfaces, prepared once for all budgets.
 pub(super) struct NodeSurfaces<'a> {
     materials: Materials<'a>,
     /// Square metres.

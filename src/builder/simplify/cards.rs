@@ -2,8 +2,8 @@
 //!
 //! Edge collapse can only drop cards, and a forest goes bare. As in stochastic simplification of aggregate detail
 //! (Cook, Halstead, Planck & Ryu 2007), some cards stay, spread evenly, and are enlarged so that the area is kept.
-//! Where the texture repeats, a card becomes a row: it is widened, and shows the whole texture several times side by
-//! side. Others become larger, and stay on the ground.
+//! If its texture repeats, a card becomes a row: it is widened, and shows the whole texture several times side by
+//! side. Other cards are scaled from their foot, so that they stay on the ground.
 
 use glam::{DVec2, DVec3};
 
@@ -20,7 +20,7 @@ const MOST_TRIANGLES: usize = 8;
 /// A card is no wider than so many times the ground that the cards measure across that it stands for.
 const WIDEST: f64 = 4.0;
 
-/// Of the cards in one place, one stays that has at least this share of the area of the largest.
+/// The card that stays in one place has at least this share of the area of the largest one there.
 const LARGE: f64 = 0.75;
 
 /// Bits of a place along each axis.
@@ -32,7 +32,7 @@ struct Card {
     material: u32,
     /// Its middle, Z up.
     middle: DVec3,
-    /// The same on the ground.
+    /// The point below its middle at its lowest height, Z up.
     foot: DVec3,
     /// Sides of the box around it, seen from above.
     extent: DVec2,
@@ -93,8 +93,8 @@ impl Cards {
         self.cards.iter().map(|card| card.part.area).sum()
     }
 
-    /// As many cards as have about `target` triangles, at least one of each material. `repeats` tells by material
-    /// whether its texture may be shown beyond its sides.
+    /// Returns as many cards as have about `target` triangles, at least one of each material. `repeats` tells by
+    /// material whether its texture may be shown beyond its sides.
     pub fn simplified(&self, target: usize, repeats: impl Fn(u32) -> bool) -> Simplified {
         let Self { mesh, border, up, cards } = self;
         let step = LadderStep::Cards;
@@ -120,7 +120,7 @@ impl Cards {
                 let widest = WIDEST * across(around);
                 let got = card.enlarge(&mut enlarged, *up, wanted, widest, repeats);
                 card.move_inside(&mut enlarged, *up, bounds);
-                // What whole copies are too small or too large, the next ones make up for.
+                // The next cards make up for the area that whole copies lack or have too much.
                 owed = (area + owed - got).clamp(-area, area);
             }
         }
@@ -280,7 +280,7 @@ fn chosen(cards: &[Card], number: u64) -> &Card {
     large.get(place as usize).copied().unwrap_or(&cards[0])
 }
 
-/// How many metres cards measure across, seen from above.
+/// Returns the diagonal of the box around cards, seen from above, metres.
 fn across(cards: &[Card]) -> f64 {
     let [low, high] = bounds(cards);
     (high - low).length()

@@ -82,7 +82,7 @@ impl Gain {
     }
 }
 
-/// How much less wrong each pixel of a node is by its children, and at least [`LEAST`] of how wrong it is.
+/// Returns by how much its children lower the error of each pixel of a node: at least [`LEAST`] of its error.
 pub(in crate::engine) fn removed(tree: &SceneTree, node: u32, per_metre: f64) -> f64 {
     let (at, children) = (tree.node(node), tree.child_nodes(node));
     let wrong = |error: f64| (error * per_metre).sqrt();
