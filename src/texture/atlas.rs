@@ -346,8 +346,9 @@ impl Page {
         }
         let [left, top] = window.origin.map(|start| start as usize);
         let [width, height] = window.size;
-        let mut pixels = Vec::with_capacity(width * height * image.channels);
-        (top..top + height).for_each(|y| pixels.extend_from_slice(image.row(y, left, width)));
+        let mut pixels = vec![0; width * height * image.channels];
+        let rows = pixels.chunks_exact_mut(width * image.channels);
+        (top..).zip(rows).for_each(|(y, row)| image.copy_row(y, left, row));
         Self { size: window.size, pixels }
     }
 
@@ -365,17 +366,16 @@ impl Page {
         let inside = (width - before).min(columns - start);
         for y in 0..window.size[1].min(self.size[1] - target[1]) {
             let row = (window.origin[1] + y as isize).clamp(0, rows as isize - 1) as usize;
-            let source = image.row(row, start, inside);
             let at = ((target[1] + y) * self.size[0] + target[0]) * channels;
             let copied = &mut self.pixels[at..at + width * channels];
             let (left, copied) = copied.split_at_mut(before * channels);
             let (middle, right) = copied.split_at_mut(inside * channels);
-            middle.copy_from_slice(source);
+            image.copy_row(row, start, middle);
             for texel in left.chunks_exact_mut(channels) {
-                texel.copy_from_slice(&source[..channels]);
+                texel.copy_from_slice(&middle[..channels]);
             }
             for texel in right.chunks_exact_mut(channels) {
-                texel.copy_from_slice(&source[(inside - 1) * channels..]);
+                texel.copy_from_slice(&middle[(inside - 1) * channels..]);
             }
         }
     }

@@ -1,5 +1,7 @@
 //! A grid of bits: which texels or cells are used.
 
+use std::ops::Range;
+
 /// Rows of bits, each row padded to whole words with zeros.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct BitGrid {
@@ -75,6 +77,12 @@ impl BitGrid {
             }
         }
         coarse
+    }
+
+    /// Some rows as a grid of their own.
+    pub fn rows(&self, rows: Range<usize>) -> Self {
+        let words = self.words[rows.start * self.stride..rows.end * self.stride].to_vec();
+        Self { height: rows.len(), words, ..*self }
     }
 
     /// How many bits are set.

@@ -10,9 +10,10 @@ use super::bake::prepared::PreparedBake;
 use super::bits::BitGrid;
 use super::cache::{Decoded, TextureCache};
 use super::charts::{Charts, UvBox};
-use super::level::{self, LevelImage, Region};
+use super::level::{self, LevelImage};
 use super::plan::{self, TextureUse};
 use super::raster::{self, Rasterizer};
+use super::region::Region;
 use super::shared::SharedTextures;
 use crate::decode::DecodedTexture;
 use crate::mesh::{Material, Mesh, Model, Wrap};
@@ -93,11 +94,24 @@ pub(super) struct AtlasSource {
     /// Along which axes charts cross the image's border.
     pub wraps: [bool; 2],
     pub channels: usize,
-    /// By level.
-    pub levels: Vec<LevelImage>,
+    /// The region and its halves, down to the resolution of the root; the coarsest first.
+    pub pyramid: Vec<LevelImage>,
+    /// By level: the region at its resolution, once a node asked for it, where it is none of the pyramid's.
+    levels: Vec<OnceLock<LevelImage>>,
 }
 
 impl AtlasSource {
+    /// The region at the resolution of a level, where one texel stands for `step` along each axis.
+    pub fn level(&self, level: usize, step: f64) -> Option<&LevelImage> {
+        // Steps are square roots: those of halves are so to rounding.
+        let is_fine = |image: &&LevelImage| image.step <= step * (1.0 + 1e-9);
+        let finer = self.pyramid.iter().find(is_fine).or(self.pyramid.last())?;
+        if step <= finer.step * (1.0 + 1e-9) {
+            return Some(finer);
+        }
+        Some(self.levels.get(level)?.get_or_init(|| finer.at_step(step)))
+    }
+
     /// The whole tiles by which a chart is moved so that it lies in the region.
     pub fn tile(&self, chart: &UvBox, axis: usize) -> f64 {
         if self.wraps[axis] {
@@ -142,15 +156,14 @@ impl<'a> BlockTextures<'a> {
             let Some(Found { region, wraps, used_texels }) = found else {
                 return (texture, Prepared::Repeating(decoded), 0);
             };
-            // Where no other block waits for the image, it becomes this one's own.
-            let image = Arc::try_unwrap(decoded)
-                .map_or_else(|shared| Arc::clone(&shared.image), |own| own.image);
+            let image = Arc::clone(&decoded.image);
             let source = AtlasSource {
                 size: [f64::from(image.width), f64::from(image.height)],
                 origin: region.origin.map(|start| start as f64),
                 wraps,
                 channels: usize::from(image.channels),
-                levels: level::level_images(image, &region, &steps),
+                pyramid: level::pyramid(image, &region, steps.first().copied().unwrap_or(1.0)),
+                levels: vec![OnceLock::new(); steps.len()],
             };
             (texture, Prepared::Atlas(source), used_texels)
         };

@@ -1,14 +1,15 @@
 //! Decoded images, shared between the blocks that use them and dropped after the last.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rustc_hash::FxHashMap;
 
-use super::level::{self, LevelImage, Region};
+use super::level::{self, LevelImage};
 use super::plan::TexturePlan;
+use super::region::Region;
 use crate::decode::{self, DecodedTexture};
 use crate::mesh::{Model, TextureData, TextureSource, Warnings};
 
@@ -29,10 +30,8 @@ impl Decoded {
     pub fn pyramid(&self) -> &[LevelImage] {
         self.pyramid.get_or_init(|| {
             let size = [self.image.width, self.image.height].map(|side| side as usize);
-            let halvings = usize::BITS - size[0].max(size[1]).leading_zeros();
-            let steps: Vec<f64> = (0..halvings).rev().map(|power| f64::from(1 << power)).collect();
             let region = Region { origin: [0; 2], size, covered: None };
-            level::level_images(Arc::clone(&self.image), &region, &steps)
+            level::pyramid(Arc::clone(&self.image), &region, f64::INFINITY)
         })
     }
 
@@ -74,11 +73,26 @@ impl ImageKey {
     }
 }
 
+/// So many bytes of decoded images are kept for blocks that have not taken them yet. To decode an image
+/// once more takes a tenth of the time in which a block's textures are made from it.
+const MOST_KEPT: u64 = 128 << 20;
+
 /// The decoded images of a build. Each is decoded when the first block takes it, and let go of when all
-/// that have announced themselves have taken it.
-#[derive(Debug, Default)]
+/// that have announced themselves have taken it, or when others taken since have so many bytes that they
+/// fill the memory that there is for images.
+#[derive(Debug)]
 pub struct DecodedImages {
     slots: Mutex<FxHashMap<ImageKey, Arc<Slot>>>,
+    /// Images that somebody has yet to take, and their bytes; the one taken last comes last.
+    kept: Mutex<VecDeque<(Arc<Slot>, u64)>>,
+    /// See [`MOST_KEPT`].
+    most_kept: u64,
+}
+
+impl Default for DecodedImages {
+    fn default() -> Self {
+        Self { slots: Mutex::default(), kept: Mutex::default(), most_kept: MOST_KEPT }
+    }
 }
 
 /// The images that a block is going to take.
@@ -125,8 +139,28 @@ impl DecodedImages {
             is_last
         };
         if is_last {
-            slot.image.lock().unwrap_or_else(PoisonError::into_inner).0 = State::Waiting;
+            let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+            kept.retain(|(other, _)| !std::ptr::eq(&**other, slot));
+            drop(kept);
+            slot.forget();
         }
+    }
+
+    /// Keeps an image for those that have not taken it yet.
+    fn keep(&self, slot: &Arc<Slot>, bytes: u64) {
+        let mut forgotten = Vec::new();
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.retain(|(other, _)| !Arc::ptr_eq(other, slot));
+        kept.push_back((Arc::clone(slot), bytes));
+        let mut sum: u64 = kept.iter().map(|(_, bytes)| bytes).sum();
+        while sum > self.most_kept
+            && let Some((oldest, bytes)) = kept.pop_front()
+        {
+            sum -= bytes;
+            forgotten.push(oldest);
+        }
+        drop(kept);
+        forgotten.iter().for_each(|slot| slot.forget());
     }
 }
 
@@ -156,6 +190,16 @@ struct Slot {
     _source: Option<TextureSource>,
     takers: AtomicU32,
     image: Mutex<(State, Findings)>,
+}
+
+impl Slot {
+    /// Lets go of the image, which is decoded again for who takes it next.
+    fn forget(&self) {
+        let mut image = self.image.lock().unwrap_or_else(PoisonError::into_inner);
+        if matches!(image.0, State::Decoded(_)) {
+            image.0 = State::Waiting;
+        }
+    }
 }
 
 /// The faults of a decoded image.
@@ -213,6 +257,11 @@ impl<'a> TextureCache<'a> {
         let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
         found.insert(texture, (failed, findings));
         drop(found);
+        if let Some(decoded) = &decoded
+            && slot.takers.load(Ordering::Relaxed) > 1
+        {
+            self.announced.images.keep(slot, decoded.image.pixels.len() as u64);
+        }
         if !self.announced.is_taken[texture as usize].swap(true, Ordering::Relaxed) {
             self.announced.images.leave(key, slot);
         }
@@ -273,5 +322,63 @@ impl<'a> TextureCache<'a> {
             }
         }
         warnings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Material, Part};
+
+    #[test]
+    fn images_beyond_the_memory_for_them_are_decoded_again() {
+        let png = |light: u8| {
+            let mut bytes = std::io::Cursor::new(Vec::new());
+            let image = image::RgbImage::from_pixel(8, 8, image::Rgb([light; 3]));
+            image.write_to(&mut bytes, image::ImageFormat::Png).expect("encodes");
+            TextureData::Embedded(bytes.into_inner().into())
+        };
+        let textures: Vec<TextureSource> = (0..3)
+            .map(|light| TextureSource { name: light.to_string(), data: png(light), opacity: None })
+            .collect();
+        let materials: Vec<Material> = (0..3)
+            .map(|texture| Material { texture: Some(texture), ..Material::plain("m") })
+            .collect();
+        let part = |material| Part {
+            material,
+            positions: vec![[0.0; 3]; 3],
+            texcoords: vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+            indices: vec![0, 1, 2],
+            ..Part::default()
+        };
+        let parts = (0..3).map(part).collect();
+        let model = Model {
+            source: PathBuf::from("three.obj"),
+            dependencies: Vec::new(),
+            groups: Vec::new(),
+            parts,
+            materials,
+            textures,
+            up: None,
+            warnings: Warnings::default(),
+        };
+        let plan = TexturePlan::new(&model);
+        // Of two blocks that take three images of 192 bytes each, one by one.
+        let shared = |most_kept| {
+            let images = DecodedImages { most_kept, ..DecodedImages::default() };
+            let announced = [(); 2].map(|()| images.announce(&model, &plan, 0..3));
+            let caches = [0, 1].map(|i| TextureCache::new(&model, &plan, &announced[i]));
+            let taken = [0, 1].map(|block| {
+                [0, 1, 2].map(|texture| caches[block].take(texture).expect("it is an image"))
+            });
+            let [one, other] = &taken;
+            assert!(one.iter().zip(other).all(|(a, b)| a.image.pixels == b.image.pixels));
+            assert!(images.kept.lock().expect("no panic").is_empty(), "all were taken");
+            one.iter().zip(other).map(|(a, b)| Arc::ptr_eq(a, b)).collect::<Vec<_>>()
+        };
+        assert_eq!(shared(600), [true, true, true]);
+        // The first is forgotten for the third.
+        assert_eq!(shared(400), [false, true, true]);
+        assert_eq!(shared(100), [false, false, false]);
     }
 }

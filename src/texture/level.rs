@@ -2,29 +2,16 @@
 
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3, Vec3, Vec4};
+use glam::{DVec3, Vec3};
 
 use super::bits::BitGrid;
 use super::fill::{self, Texels};
+use super::region::{REACH, Region, RegionRows};
+use super::sampler::Sampler;
 use super::scale::{self, LinearImage, Rows, Weights};
+use super::tiles::Tiles;
 use crate::color;
 use crate::decode::DecodedTexture;
-
-/// How far, in texels, used texels are extended into unused ones at every level: no block of a
-/// JPEG (16 a side, with half the colour resolution) that holds a used texel holds a foreign one,
-/// and atlases copy less around a chart (half a cell of reach and the rest of the last cell).
-const REACH: usize = 16;
-
-/// Which texels of a texture a block uses.
-#[derive(Debug)]
-pub(crate) struct Region {
-    /// First column and row; outside 0..size where charts cross the image's border.
-    pub origin: [i64; 2],
-    /// Columns and rows, at least 1.
-    pub size: [usize; 2],
-    /// The texels that some triangle uses; `None` where it is (nearly) all of them.
-    pub covered: Option<BitGrid>,
-}
 
 /// A region at one level's resolution.
 #[derive(Clone, Debug)]
@@ -38,111 +25,54 @@ pub(crate) struct LevelImage {
     pixels: Pixels,
 }
 
-/// An image's texels in linear light.
-#[derive(Clone, Copy)]
-pub(crate) struct Sampler<'a> {
-    /// From the first texel on.
-    bytes: &'a [u8],
-    channels: usize,
-    /// Bytes from one row to the next.
-    row: usize,
-    size: [usize; 2],
-    /// The middle of the last texel from that of the first.
-    last: DVec2,
-    light: &'static [f32; 256],
-}
-
-impl Sampler<'_> {
-    /// The colour at a position in texels by bilinear sampling, linear light, 0–1, and 1; beyond
-    /// the image its border texels go on.
-    #[inline]
-    pub fn at(&self, at: DVec2) -> Vec4 {
-        let low = (at - 0.5).clamp(DVec2::ZERO, self.last);
-        // As i32, to which and from which processors convert in one step.
-        let [x, y] = [low.x as i32, low.y as i32];
-        let [along, down] = [(low.x - f64::from(x)) as f32, (low.y - f64::from(y)) as f32];
-        let [x, y] = [x as usize, y as usize];
-        let next = if x + 1 < self.size[0] { self.channels } else { 0 };
-        let below = if y + 1 < self.size[1] { self.row } else { 0 };
-        let first = y * self.row + x * self.channels;
-        let mix = |start: usize| {
-            let (one, other) = (self.texel(start), self.texel(start + next));
-            one + (other - one) * along
-        };
-        let (upper, lower) = (mix(first), mix(first + below));
-        upper + (lower - upper) * down
-    }
-
-    /// Returns the colour at a position inside of an image that goes on at its other side along the axes where it
-    /// `repeats`, linear light, 0–1, and 1.
-    pub fn at_repeating(&self, at: DVec2, repeats: [bool; 2]) -> Vec4 {
-        // Two texels, and the share of the second.
-        let pair = |axis: usize| {
-            let (size, low) = (self.size[axis], at[axis] - 0.5);
-            if !repeats[axis] {
-                let low = low.clamp(0.0, self.last[axis]);
-                let first = low as usize;
-                return (first, (first + 1).min(size - 1), (low - first as f64) as f32);
-            }
-            let second = (low.floor() + 1.0) as usize % size;
-            ((second + size - 1) % size, second, (low - low.floor()) as f32)
-        };
-        let ((left, right, along), (top, bottom, down)) = (pair(0), pair(1));
-        let mix = |row: usize| {
-            let texel = |column: usize| self.texel(row * self.row + column * self.channels);
-            let (one, other) = (texel(left), texel(right));
-            one + (other - one) * along
-        };
-        let (upper, lower) = (mix(top), mix(bottom));
-        upper + (lower - upper) * down
-    }
-
-    /// The mean of the square of two by two texels around a position, linear light, 0–1, and 1;
-    /// beyond the image its border texels go on.
-    #[inline]
-    pub fn mean_at(&self, at: DVec2) -> Vec4 {
-        let at = at.clamp(DVec2::ZERO, self.last + 0.999_999);
-        let [x, y] = [at.x as i32, at.y as i32];
-        let [along, down] = [(at.x - f64::from(x)) as f32, (at.y - f64::from(y)) as f32];
-        let [x, y] = [x as usize, y as usize];
-        let middle = y * self.row + x * self.channels;
-        let left = if x > 0 { self.channels } else { 0 };
-        let right = if x + 1 < self.size[0] { self.channels } else { 0 };
-        let above = if y > 0 { self.row } else { 0 };
-        let below = if y + 1 < self.size[1] { self.row } else { 0 };
-        let row = |start: usize| {
-            let (one, two) = (self.texel(start - left), self.texel(start));
-            one + (self.texel(start + right) - one) * along + two
-        };
-        let (one, two) = (row(middle - above), row(middle));
-        (one + (row(middle + below) - one) * down + two) * 0.25
-    }
-
-    #[inline]
-    fn texel(&self, start: usize) -> Vec4 {
-        let texel = &self.bytes[start..start + 3];
-        let [r, g, b] = [texel[0], texel[1], texel[2]].map(|byte| self.light[usize::from(byte)]);
-        Vec4::new(r, g, b, 1.0)
-    }
-}
-
 #[derive(Clone, Debug)]
 enum Pixels {
     /// The source's own, from this column and row on.
     Source(Arc<DecodedTexture>, [usize; 2]),
     Own(Vec<u8>),
+    /// Those that are used, of an image of which much is not.
+    Used(Tiles),
 }
 
 impl LevelImage {
-    /// `start..start + count` of a row; the caller keeps to the size.
-    pub fn row(&self, y: usize, start: usize, count: usize) -> &[u8] {
-        let (pixels, width, x, y) = match &self.pixels {
-            Pixels::Source(image, offset) => {
-                (&image.pixels, image.width as usize, start + offset[0], y + offset[1])
+    /// Copies the texels of a row from `start` on; the caller keeps to the size.
+    pub fn copy_row(&self, y: usize, start: usize, texels: &mut [u8]) {
+        match &self.pixels {
+            Pixels::Source(image, [left, top]) => {
+                let first = ((y + top) * image.width as usize + left + start) * self.channels;
+                texels.copy_from_slice(&image.pixels[first..first + texels.len()]);
             }
-            Pixels::Own(pixels) => (pixels, self.size[0], start, y),
-        };
-        &pixels[(y * width + x) * self.channels..][..count * self.channels]
+            Pixels::Own(pixels) => {
+                let first = (y * self.size[0] + start) * self.channels;
+                texels.copy_from_slice(&pixels[first..first + texels.len()]);
+            }
+            Pixels::Used(tiles) => tiles.copy_row(y, start, texels),
+        }
+    }
+
+    /// So many texels of a row from `start` on.
+    #[cfg(test)]
+    pub fn texels(&self, y: usize, start: usize, count: usize) -> Vec<u8> {
+        let mut texels = vec![0; count * self.channels];
+        self.copy_row(y, start, &mut texels);
+        texels
+    }
+
+    /// The texels of a row, which are copied to `copy` where they do not lie side by side.
+    fn row<'a>(&'a self, y: usize, copy: &'a mut Vec<u8>) -> &'a [u8] {
+        let bytes = self.size[0] * self.channels;
+        match &self.pixels {
+            Pixels::Source(image, [left, top]) => {
+                let first = ((y + top) * image.width as usize + left) * self.channels;
+                &image.pixels[first..first + bytes]
+            }
+            Pixels::Own(pixels) => &pixels[y * bytes..(y + 1) * bytes],
+            Pixels::Used(tiles) => {
+                copy.resize(bytes, 0);
+                tiles.copy_row(y, 0, copy);
+                copy
+            }
+        }
     }
 
     /// An image of these bytes.
@@ -155,15 +85,10 @@ impl LevelImage {
         let (bytes, width, [x, y]) = match &self.pixels {
             Pixels::Source(image, offset) => (&image.pixels[..], image.width as usize, *offset),
             Pixels::Own(pixels) => (&pixels[..], self.size[0], [0; 2]),
+            Pixels::Used(tiles) => return Sampler::of_tiles(tiles, self.size),
         };
-        Sampler {
-            bytes: &bytes[(y * width + x) * self.channels..],
-            channels: self.channels,
-            row: width * self.channels,
-            size: self.size,
-            last: DVec2::from(self.size.map(|side| side as f64 - 1.0)),
-            light: color::byte_to_light(),
-        }
+        let (texel, row) = (self.channels, width * self.channels);
+        Sampler::of_rows(&bytes[y * row + x * texel..], self.size, texel, row)
     }
 
     /// The mean colour, linear light, 0–1.
@@ -171,8 +96,9 @@ impl LevelImage {
         let light = color::byte_to_light();
         let [width, height] = self.size;
         let mut sum = DVec3::ZERO;
+        let mut copy = Vec::new();
         for y in 0..height {
-            for texel in self.row(y, 0, width).chunks_exact(self.channels) {
+            for texel in self.row(y, &mut copy).chunks_exact(self.channels) {
                 let of = |channel: usize| light[usize::from(texel[channel])];
                 sum += Vec3::new(of(0), of(1), of(2)).as_dvec3();
             }
@@ -182,18 +108,19 @@ impl LevelImage {
 
     /// The same at half the resolution.
     pub fn halved(&self) -> Self {
-        self.reduced(2.0)
+        let step = 2.0 * self.step;
+        if self.channels != 3 {
+            return self.at_step(step);
+        }
+        let size = self.size.map(|side| side.div_ceil(2));
+        Self { size, channels: 3, step, pixels: Pixels::Own(self.halved_rgb()) }
     }
 
-    /// The same with `ratio` times fewer texels along each axis; at least 1.
-    fn reduced(&self, ratio: f64) -> Self {
-        let (size, pixels) = if self.channels == 3 && (ratio - 2.0).abs() < 1e-9 {
-            (self.size.map(|side| side.div_ceil(2)), self.halved_rgb())
-        } else {
-            let image = scale::area(&mut ImageRows { image: self }, [ratio; 2]);
-            ([image.width, image.height], bytes(&image, self.channels))
-        };
-        Self { size, channels: self.channels, step: self.step * ratio, pixels: Pixels::Own(pixels) }
+    /// The same with a texel for so many source texels along each axis, which are not fewer than now.
+    pub fn at_step(&self, step: f64) -> Self {
+        let image = scale::area(&mut ImageRows::of(self), [step / self.step; 2]);
+        let (size, pixels) = ([image.width, image.height], bytes(&image, self.channels));
+        Self { size, channels: self.channels, step, pixels: Pixels::Own(pixels) }
     }
 
     /// Means of two by two texels in linear light; where a side is odd, of what there is.
@@ -203,10 +130,12 @@ impl LevelImage {
         let [width, height] = self.size;
         let columns = width.div_ceil(2);
         let mut pixels = vec![0; columns * height.div_ceil(2) * 3];
+        let mut copies = [Vec::new(), Vec::new()];
         for (index, result) in pixels.chunks_exact_mut(columns * 3).enumerate() {
             let (y, below) = (2 * index, (2 * index + 1).min(height - 1));
-            let (upper, last) = self.row(y, 0, width).as_chunks::<6>();
-            let (lower, last_lower) = self.row(below, 0, width).as_chunks::<6>();
+            let [copy, copy_below] = &mut copies;
+            let (upper, last) = self.row(y, copy).as_chunks::<6>();
+            let (lower, last_lower) = self.row(below, copy_below).as_chunks::<6>();
             let (texels, last_texel) = result.split_at_mut(upper.len() * 3);
             for ((texel, upper), lower) in
                 texels.as_chunks_mut::<3>().0.iter_mut().zip(upper).zip(lower)
@@ -226,11 +155,16 @@ impl LevelImage {
         pixels
     }
 
-    /// Extends the used texels of an image that is its own.
-    fn extend(&mut self, used: &BitGrid) {
-        if let Pixels::Own(pixels) = &mut self.pixels {
-            let (channels, stride) = (self.channels, self.size[0]);
-            fill::extend(&mut Texels { pixels, channels, stride, origin: [0; 2] }, used, REACH);
+    /// Extends the used texels of an image that is its own, and lets go of what is far from them.
+    fn keep_used(&mut self, used: &BitGrid) {
+        let Pixels::Own(pixels) = &mut self.pixels else { return };
+        let (channels, stride) = (self.channels, self.size[0]);
+        fill::extend(&mut Texels { pixels, channels, stride, origin: [0; 2] }, used, REACH);
+        if let Some(mut tiles) = Tiles::around(used, REACH, channels) {
+            let rows = pixels.chunks_exact(stride * channels);
+            rows.enumerate().for_each(|(y, row)| tiles.write_row(y, row));
+            tiles.finish();
+            self.pixels = Pixels::Used(tiles);
         }
     }
 }
@@ -252,38 +186,23 @@ fn bytes(image: &LinearImage, channels: usize) -> Vec<u8> {
     pixels
 }
 
-/// Makes the images of all levels; `steps` are source texels per texel along each axis, the
-/// finest (1) last.
+/// Makes a region's image and its halves, as long as one texel stands for at most `most` along each axis; the
+/// coarsest comes first.
 ///
-/// The finest is the source itself, each other one is scaled from the next finer. Unused texels
-/// near used ones take these's colours first, so that no mean mixes in a foreign one.
-pub(crate) fn level_images(
-    image: Arc<DecodedTexture>,
-    region: &Region,
-    steps: &[f64],
-) -> Vec<LevelImage> {
-    let source = source_level(image, region);
+/// What is not used and not near is left out where this is much. Unused texels near used ones take these's
+/// colours first, so that no mean mixes in a foreign one.
+pub(crate) fn pyramid(image: Arc<DecodedTexture>, region: &Region, most: f64) -> Vec<LevelImage> {
+    let mut levels = vec![source_level(image, region)];
     let mut used = region.covered.clone();
-    let mut coarser = |finer: &LevelImage, step: f64| {
-        let ratio = step / finer.step;
-        // Exact, whatever the products round to.
-        let mut level = LevelImage { step, ..finer.reduced(ratio) };
+    while let Some(finer) = levels.last()
+        && 2.0 * finer.step <= most * (1.0 + 1e-9)
+        && finer.size != [1; 2]
+    {
+        let mut level = finer.halved();
         if let Some(used) = &mut used {
-            *used = used.coarser(ratio, level.size[0], level.size[1]);
-            level.extend(used);
+            *used = used.coarser(2.0, level.size[0], level.size[1]);
+            level.keep_used(used);
         }
-        level
-    };
-    let mut levels: Vec<LevelImage> = Vec::with_capacity(steps.len());
-    let mut steps = steps.iter().rev();
-    match steps.next() {
-        Some(finest) if *finest > source.step => levels.push(coarser(&source, *finest)),
-        Some(_) => levels.push(source),
-        None => return levels,
-    }
-    for step in steps {
-        let finer = &levels[levels.len() - 1];
-        let level = if *step > finer.step { coarser(finer, *step) } else { finer.clone() };
         levels.push(level);
     }
     levels.reverse();
@@ -291,53 +210,35 @@ pub(crate) fn level_images(
 }
 
 /// The region at full resolution: the source's texels as they are, unused ones near used ones
-/// replaced by their neighbours' colours. Nothing is copied where nobody else has the image.
-fn source_level(mut image: Arc<DecodedTexture>, region: &Region) -> LevelImage {
+/// replaced by their neighbours' colours.
+fn source_level(image: Arc<DecodedTexture>, region: &Region) -> LevelImage {
     let channels = usize::from(image.channels);
-    let [width, height] = region.size;
-    let source = [image.width as usize, image.height as usize];
-    let inside = (0..2).all(|axis| {
-        region.origin[axis] >= 0 && region.origin[axis] as usize + region.size[axis] <= source[axis]
-    });
-    let origin = region.origin.map(|start| start.max(0) as usize);
     let level = |pixels| LevelImage { size: region.size, channels, step: 1.0, pixels };
-    if inside {
-        let Some(covered) = &region.covered else {
-            return level(Pixels::Source(image, origin));
-        };
-        if let Some(own) = Arc::get_mut(&mut image) {
-            let pixels = &mut own.pixels[..];
-            fill::extend(
-                &mut Texels { pixels, channels, stride: source[0], origin },
-                covered,
-                REACH,
-            );
-            return level(Pixels::Source(image, origin));
-        }
+    if let Some(origin) = region.is_best_shared(&image) {
+        return level(Pixels::Source(image, origin));
     }
-    let mut pixels = Vec::with_capacity(width * height * channels);
-    for y in 0..height {
-        let row = (region.origin[1] + y as i64).rem_euclid(source[1] as i64) as usize;
-        let row = &image.pixels[row * source[0] * channels..][..source[0] * channels];
-        let mut x = region.origin[0].rem_euclid(source[0] as i64) as usize;
-        let mut left = width;
-        while left > 0 {
-            let count = left.min(source[0] - x);
-            pixels.extend_from_slice(&row[x * channels..(x + count) * channels]);
-            left -= count;
-            x = 0;
-        }
+    let mut rows = RegionRows::new(&image, region);
+    let tiles = region.covered.as_ref().and_then(|used| Tiles::around(used, REACH, channels));
+    if let Some(mut tiles) = tiles {
+        (0..region.size[1]).for_each(|y| tiles.write_row(y, rows.row(y)));
+        tiles.finish();
+        return level(Pixels::Used(tiles));
     }
-    let mut level = level(Pixels::Own(pixels));
-    if let Some(covered) = &region.covered {
-        level.extend(covered);
-    }
-    level
+    let mut pixels = Vec::with_capacity(region.size[0] * region.size[1] * channels);
+    (0..region.size[1]).for_each(|y| pixels.extend_from_slice(rows.row(y)));
+    level(Pixels::Own(pixels))
 }
 
 /// Rows of a level image for the scaler.
 struct ImageRows<'a> {
     image: &'a LevelImage,
+    copy: Vec<u8>,
+}
+
+impl<'a> ImageRows<'a> {
+    fn of(image: &'a LevelImage) -> Self {
+        Self { image, copy: Vec::new() }
+    }
 }
 
 impl Rows for ImageRows<'_> {
@@ -351,7 +252,7 @@ impl Rows for ImageRows<'_> {
 
     fn read(&mut self, y: usize, rgb: &mut [u16], weight: &mut [u16]) -> Weights {
         let table = color::byte_to_linear();
-        let row = self.image.row(y, 0, self.image.size[0]);
+        let row = self.image.row(y, &mut self.copy);
         if self.image.channels == 3 {
             for (value, byte) in rgb.iter_mut().zip(row) {
                 *value = table[usize::from(*byte)];
@@ -383,7 +284,7 @@ pub(crate) fn resize_whole(image: &Arc<DecodedTexture>, size: [usize; 2]) -> Dec
         pixels: Pixels::Source(Arc::clone(image), [0, 0]),
     };
     let step = [0, 1].map(|axis| whole[axis] as f64 / size[axis] as f64);
-    let resized = scale::area(&mut ImageRows { image: &view }, step);
+    let resized = scale::area(&mut ImageRows::of(&view), step);
     DecodedTexture {
         width: resized.width as u32,
         height: resized.height as u32,
@@ -406,19 +307,22 @@ mod tests {
     fn the_finest_level_is_the_source_itself() {
         let source = image(16, 9, 3);
         let region = Region { origin: [3, 2], size: [10, 5], covered: None };
-        let levels = level_images(Arc::clone(&source), &region, &[2.6, 1.3, 1.0]);
-        assert_eq!(levels[2].row(4, 1, 3), &source.pixels[(6 * 16 + 4) * 3..][..9]);
-        assert_eq!(levels[1].size, [8, 4]);
-        assert_eq!(levels[0].size, [4, 2]);
+        let levels = pyramid(Arc::clone(&source), &region, 4.0);
+        let finest = &levels[2];
+        assert_eq!(finest.texels(4, 1, 3), &source.pixels[(6 * 16 + 4) * 3..][..9]);
+        assert_eq!(levels[1].size, [5, 3]);
+        assert_eq!(levels[0].size, [3, 2]);
+        let between = finest.at_step(1.3);
+        assert_eq!((between.size, between.step), ([8, 4], 1.3));
     }
 
     #[test]
     fn a_region_over_the_border_wraps() {
         let source = image(16, 9, 3);
         let region = Region { origin: [-2, 7], size: [20, 4], covered: None };
-        let level = &level_images(Arc::clone(&source), &region, &[1.0])[0];
-        assert_eq!(level.row(0, 0, 1), &source.pixels[(7 * 16 + 14) * 3..][..3]);
-        assert_eq!(level.row(2, 18, 1), &source.pixels[..3]);
+        let level = &pyramid(Arc::clone(&source), &region, 1.0)[0];
+        assert_eq!(level.texels(0, 0, 1), &source.pixels[(7 * 16 + 14) * 3..][..3]);
+        assert_eq!(level.texels(2, 18, 1), &source.pixels[..3]);
     }
 
     #[test]
@@ -435,15 +339,17 @@ mod tests {
             }
         }
         let region = Region { origin: [0; 2], size: [64; 2], covered: Some(covered) };
-        for steps in [[12.0, 6.0, 3.0, 1.5, 1.0], [16.0, 8.0, 4.0, 2.0, 1.0]] {
-            for level in &level_images(Arc::new(source.clone()), &region, &steps) {
-                for y in 0..level.size[1] {
-                    for (x, texel) in level.row(y, 0, level.size[0]).chunks(3).enumerate() {
-                        // Sixteen texels along one axis are as many or more on the diagonal.
-                        let distance = (x as f64).hypot(y as f64) - 50.0 / level.step;
-                        if distance < 16.0 {
-                            assert!(texel[0].abs_diff(180) <= 1 && texel[1].abs_diff(90) <= 1);
-                        }
+        let halves = pyramid(Arc::new(source), &region, 16.0);
+        let between: Vec<LevelImage> =
+            halves.iter().map(|level| level.at_step(1.5 * level.step)).collect();
+        for level in halves.iter().chain(&between) {
+            for y in 0..level.size[1] {
+                for (x, texel) in level.texels(y, 0, level.size[0]).chunks(3).enumerate() {
+                    // Sixteen texels along one axis are as many or more on the diagonal, of an image that is
+                    // scaled again two thirds of them.
+                    let distance = (x as f64).hypot(y as f64) - 50.0 / level.step;
+                    if distance < 10.0 {
+                        assert!(texel[0].abs_diff(180) <= 1 && texel[1].abs_diff(90) <= 1);
                     }
                 }
             }
@@ -451,18 +357,20 @@ mod tests {
     }
 
     #[test]
-    fn a_image_that_others_have_too_stays_as_it_is() {
-        let shared = image(16, 9, 3);
-        let mut covered = BitGrid::new(16, 9);
-        covered.set(8, 4);
-        let region = Region { origin: [0; 2], size: [16, 9], covered: Some(covered) };
-        let before = shared.pixels.clone();
-        let of_shared = level_images(Arc::clone(&shared), &region, &[2.0, 1.0]);
-        assert_eq!(shared.pixels, before);
-        let of_own = level_images(shared, &region, &[2.0, 1.0]);
-        for (a, b) in of_shared.iter().zip(&of_own) {
-            assert!((0..a.size[1]).all(|y| a.row(y, 0, a.size[0]) == b.row(y, 0, b.size[0])));
-            assert_eq!(a.row(0, 0, 1), a.row(a.size[1] - 1, a.size[0] - 1, 1));
+    fn what_is_far_from_all_that_is_used_is_not_kept() {
+        let source = image(500, 300, 3);
+        let mut used = BitGrid::new(500, 300);
+        (100..150).for_each(|y| used.set_span(y, 200, 270));
+        let region = |covered| Region { origin: [0; 2], size: [500, 300], covered };
+        let whole = pyramid(Arc::clone(&source), &region(None), 4.0);
+        let part = pyramid(source, &region(Some(used)), 4.0);
+        for (whole, part) in whole.iter().zip(&part) {
+            assert!(matches!(part.pixels, Pixels::Used(_)));
+            let at = |side: f64| (side / part.step) as usize;
+            for y in at(104.0)..at(144.0) {
+                let [start, end] = [at(204.0), at(264.0)];
+                assert_eq!(part.texels(y, start, end - start), whole.texels(y, start, end - start));
+            }
         }
     }
 
@@ -472,14 +380,17 @@ mod tests {
         let [width, height] = [8, 6];
         let source = DecodedTexture { width, height, channels: 3, pixels: checker.collect() };
         let region = Region { origin: [0; 2], size: [8, 6], covered: None };
-        let level = &level_images(Arc::new(source), &region, &[2.0])[0];
-        assert!((0..3).all(|y| level.row(y, 0, 4).iter().all(|byte| *byte == 188)));
+        let level = &pyramid(Arc::new(source), &region, 2.0)[0];
+        assert!((0..3).all(|y| level.texels(y, 0, 4).iter().all(|byte| *byte == 188)));
 
         let pixels = [[0; 3], [255; 3], [9; 3]].concat();
         let odd = DecodedTexture { width: 3, height: 1, channels: 3, pixels };
         let region = Region { origin: [0; 2], size: [3, 1], covered: None };
-        let level = &level_images(Arc::new(odd), &region, &[2.0, 1.0])[0];
-        assert_eq!((level.size, level.row(0, 0, 2)), ([2, 1], &[188, 188, 188, 9, 9, 9][..]));
+        let level = &pyramid(Arc::new(odd), &region, 2.0)[0];
+        assert_eq!(
+            (level.size, &level.texels(0, 0, 2)[..]),
+            ([2, 1], &[188, 188, 188, 9, 9, 9][..])
+        );
     }
 
     #[test]
@@ -487,54 +398,10 @@ mod tests {
         let pixels = [[200, 100, 50, 255], [0, 0, 0, 0]].concat().repeat(32);
         let source = Arc::new(DecodedTexture { width: 8, height: 8, channels: 4, pixels });
         let region = Region { origin: [0; 2], size: [8; 2], covered: None };
-        let level = &level_images(source, &region, &[2.0])[0];
-        assert!(level.row(1, 0, 4).chunks(4).all(|texel| texel[0].abs_diff(200) <= 1
+        let level = &pyramid(source, &region, 2.0)[0];
+        assert!(level.texels(1, 0, 4).chunks(4).all(|texel| texel[0].abs_diff(200) <= 1
             && texel[2].abs_diff(50) <= 1
             && texel[3].abs_diff(128) <= 1));
-    }
-
-    #[test]
-    fn wide_samples_are_means_of_two_by_two_texels_anywhere() {
-        let source = image(9, 7, 3);
-        let region = Region { origin: [0; 2], size: [9, 7], covered: None };
-        let level = &level_images(Arc::clone(&source), &region, &[1.0])[0];
-        let light = |x: f64, y: f64| {
-            let texel = level.row(y.clamp(0.0, 6.0) as usize, x.clamp(0.0, 8.0) as usize, 1);
-            DVec2::from([0, 2].map(|c| f64::from(color::byte_to_light()[usize::from(texel[c])])))
-        };
-        for at in [[4.25, 3.75], [4.5, 3.0], [0.25, 0.5], [8.75, 6.5], [5.0, -2.0], [12.0, 3.5]] {
-            let at = DVec2::from(at);
-            // From beyond the image its border is seen.
-            let near = at.clamp(DVec2::ZERO, DVec2::new(9.0, 7.0));
-            let parts = (0..64).flat_map(|i| (0..64).map(move |j| (i, j)));
-            let mean = parts
-                .map(|(i, j)| {
-                    let step = |part: i32| (f64::from(part) + 0.5) / 32.0 - 1.0;
-                    light(near.x + step(i), near.y + step(j))
-                })
-                .sum::<DVec2>()
-                / 4096.0;
-            let found = level.sampler().mean_at(at);
-            assert!((f64::from(found.x) - mean.x).abs() < 1e-4, "{at} {found} {mean}");
-            assert!((f64::from(found.z) - mean.y).abs() < 1e-4, "{at} {found} {mean}");
-        }
-    }
-
-    #[test]
-    fn an_image_that_repeats_goes_on_at_its_other_side() {
-        let source = image(5, 4, 3);
-        let region = Region { origin: [0; 2], size: [5, 4], covered: None };
-        let level = &level_images(Arc::clone(&source), &region, &[1.0])[0];
-        let around = Region { origin: [-1, -1], size: [7, 6], covered: None };
-        let around = &level_images(source, &around, &[1.0])[0];
-        for (x, y) in (0..20).flat_map(|y| (0..25).map(move |x| (x, y))) {
-            let at = DVec2::new(f64::from(x), f64::from(y)) * 0.2 + 0.01;
-            let found = level.sampler().at_repeating(at, [true; 2]);
-            let expected = around.sampler().at(at + 1.0);
-            assert!((found - expected).abs().max_element() < 1e-6, "{at}: {found} {expected}");
-            let clamped = level.sampler().at_repeating(at, [false; 2]);
-            assert!((clamped - level.sampler().at(at)).abs().max_element() < 1e-6, "{at}");
-        }
     }
 
     #[test]

@@ -32,12 +32,15 @@ mod placement;
 mod plan;
 mod primitives;
 mod raster;
+mod region;
+mod sampler;
 mod scale;
 mod shape;
 mod shared;
 mod split;
 #[cfg(test)]
 mod tests;
+mod tiles;
 mod wrapped_page;
 
 pub use bake::{BakeClasses, BakePlan, BakeReason, BakedMesh};

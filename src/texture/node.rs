@@ -391,14 +391,14 @@ impl<'a> NodeBuilder<'a> {
     fn coarser(&self, texture: u32) -> Option<Cow<'a, LevelImage>> {
         let Prepared::Atlas(source) = &self.block.textures[texture as usize] else { return None };
         match self.level.checked_sub(1) {
-            Some(above) => source.levels.get(above).map(Cow::Borrowed),
-            None => source.levels.first().map(|root| Cow::Owned(root.halved())),
+            Some(above) => source.level(above, self.block.steps[above]).map(Cow::Borrowed),
+            None => source.level(0, self.block.steps[0]).map(|root| Cow::Owned(root.halved())),
         }
     }
 
     fn level_image(&self, texture: u32) -> Option<&'a LevelImage> {
         match &self.block.textures[texture as usize] {
-            Prepared::Atlas(source) => source.levels.get(self.level),
+            Prepared::Atlas(source) => source.level(self.level, self.block.steps[self.level]),
             _ => None,
         }
     }

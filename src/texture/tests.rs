@@ -4,7 +4,8 @@ use std::io::Cursor;
 use std::path::PathBuf;
 
 use super::atlas::{Atlas, AtlasImage, AtlasInput, Page};
-use super::level::{LevelImage, Region, level_images};
+use super::level::{LevelImage, pyramid};
+use super::region::Region;
 use super::*;
 use crate::decode::DecodedTexture;
 use crate::format::{NodeImageData, NodeMesh, Surface};
@@ -70,7 +71,7 @@ fn of_page(page: &Page) -> impl Fn(usize, usize) -> [f64; 3] + '_ {
 
 fn of_level(level: &LevelImage) -> impl Fn(usize, usize) -> [f64; 3] + '_ {
     |x, y| {
-        let texel = level.row(y, x, 1);
+        let texel = level.texels(y, x, 1);
         [0, 1, 2].map(|channel| f64::from(texel[channel]))
     }
 }
@@ -102,7 +103,7 @@ fn whole(image: DecodedTexture) -> LevelImage {
         size: [image.width as usize, image.height as usize],
         covered: None,
     };
-    level_images(std::sync::Arc::new(image), &region, &[1.0]).remove(0)
+    pyramid(std::sync::Arc::new(image), &region, 1.0).remove(0)
 }
 
 fn inside([a, b, c]: [[f64; 2]; 3], random: &mut Random) -> [f64; 2] {

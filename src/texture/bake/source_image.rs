@@ -5,7 +5,8 @@ use glam::{DVec2, Vec4};
 use super::source::SourceTriangle;
 use crate::mesh::Wrap;
 use crate::texture::block::{BlockTextures, Prepared};
-use crate::texture::level::{LevelImage, Sampler};
+use crate::texture::level::LevelImage;
+use crate::texture::sampler::Sampler;
 
 /// Continuation of an image beyond its sides.
 #[derive(Clone, Copy)]
@@ -88,7 +89,7 @@ impl BlockTextures<'_> {
     pub(super) fn image_of(&self, triangle: &SourceTriangle) -> Option<SourceImage<'_>> {
         match self.image_of_material(triangle.material)? {
             Prepared::Absent => None,
-            Prepared::Atlas(atlas) => Some(SourceImage { levels: &atlas.levels, wrapping: None }),
+            Prepared::Atlas(atlas) => Some(SourceImage { levels: &atlas.pyramid, wrapping: None }),
             Prepared::Repeating(decoded) => {
                 let modes = self.model.materials[triangle.material as usize].wrap;
                 let size = [decoded.image.width, decoded.image.height].map(f64::from);

@@ -81,7 +81,7 @@ impl BlockTextures<'_> {
         let texture = self.material_textures.get(material as usize).copied().flatten()?;
         let coarsest = match self.image_of_material(material)? {
             Prepared::Absent => return None,
-            Prepared::Atlas(source) => source.levels.first()?,
+            Prepared::Atlas(source) => source.pyramid.first()?,
             Prepared::Repeating(decoded) => decoded.pyramid().first()?,
         };
         let mean = *self.means.get(texture as usize)?.get_or_init(|| coarsest.mean());
