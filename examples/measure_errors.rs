@@ -12,7 +12,9 @@ use hlod::builder::border::vertex::{self, Border};
 use hlod::builder::constants::Constants;
 use hlod::builder::error::{Below, SearchableSurface, measure};
 use hlod::builder::gather::gather;
-use hlod::builder::simplify::ladder::{AppearanceWeights, Ladder, Method, Simplifier};
+use hlod::builder::simplify::ladder::{
+    AppearanceWeights, BodyPlacement, Ladder, Method, Simplifier,
+};
 use hlod::mesh::{Mesh, UpAxis};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -58,8 +60,9 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let border = Border::interior(chunk.positions.len());
                 let target = (chunk.triangles.len() / ratio).max(8);
                 let path = vertex::Path::default();
-                let simplified =
-                    Ladder::new(chunk, &border, &path, 0, method).simplified(target).mesh;
+                let simplified = Ladder::new(chunk, &border, &path, 0, method)
+                    .simplified(target, BodyPlacement::InPlace)
+                    .mesh;
                 let begin = Instant::now();
                 let below = Below::source(SearchableSurface::of(chunk, constants.measure), 0.0);
                 made += begin.elapsed();

@@ -318,6 +318,12 @@ impl Outline {
 }
 
 impl OutlineCoverage {
+    /// The ground that is covered, be it that of the source or beside it, over that of the source; 1 where the
+    /// source covers none.
+    pub fn covered(&self) -> f64 {
+        self.area.zip(self.area_added).map_or(1.0, |(kept, added)| kept + added)
+    }
+
     /// The smaller share of the ground and of the skyline; 1 where there is neither.
     pub fn least(&self) -> f64 {
         self.area.unwrap_or(1.0).min(self.skyline.unwrap_or(1.0))

@@ -28,6 +28,7 @@ mod seams;
 mod soups;
 mod stored_errors;
 mod subsets;
+mod suburb;
 mod tiles;
 mod tileset;
 mod touching;

@@ -75,6 +75,11 @@ impl Below {
         Self { nodes: vec![Surface { original, bound, children: self.nodes }], ..self }
     }
 
+    /// The triangles of the children, which are drawn where the node is not.
+    pub fn triangles(&self) -> usize {
+        self.nodes.iter().map(BoundedNode::triangles).sum()
+    }
+
     /// The largest bound of the children, metres: that of the node is no less.
     pub(super) fn bound(&self) -> f64 {
         largest_bound(&self.nodes)

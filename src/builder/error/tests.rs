@@ -5,7 +5,9 @@ use glam::DVec3;
 use super::*;
 use crate::builder::border::vertex::{Border, Path};
 use crate::builder::constants::{Constants, MeasureConstants};
-use crate::builder::simplify::ladder::{AppearanceWeights, Ladder, Method, Simplifier};
+use crate::builder::simplify::ladder::{
+    AppearanceWeights, BodyPlacement, Ladder, Method, Simplifier,
+};
 use crate::mesh::{Mesh, UpAxis};
 use crate::random::Random;
 
@@ -396,7 +398,7 @@ fn a_plane_of_fewer_triangles_is_at_no_distance() {
         };
         let border = Border::interior(plane.positions.len());
         let ladder = Ladder::new(&plane, &border, &Path::default(), 0, method);
-        let fewer = ladder.simplified(target).mesh;
+        let fewer = ladder.simplified(target, BodyPlacement::InPlace).mesh;
         assert!(fewer.triangles.len() <= target.max(8));
         let measured = measure(&original, &fewer);
         assert_eq!(measured.error.bound, 0.0, "{target}: {measured:?}");

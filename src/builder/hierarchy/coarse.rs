@@ -19,7 +19,7 @@ use crate::builder::simplify::cap::cap_sections;
 use crate::builder::simplify::compact::compact;
 use crate::builder::simplify::face_colors::with_face_colors;
 use crate::builder::simplify::fallback::fallback_triangles;
-use crate::builder::simplify::ladder::{AppearanceWeights, Method};
+use crate::builder::simplify::ladder::{AppearanceWeights, BodyPlacement, Method};
 use crate::builder::simplify::normal_sets::{NormalSets, weld_normals};
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::builder::simplify::weld_seams::weld_seams;
@@ -146,6 +146,11 @@ fn lies_in_plane(corners: [[f32; 3]; 3], path: &Path) -> bool {
     })
 }
 
+/// Bodies that stand apart become fewer and larger boxes where the node would not be written otherwise, and
+/// what is drawn in its place has more than this many times its triangles. That of one level that is not
+/// written has four times as many, which is less harm than boxes in other places.
+const HEAVY: usize = 8;
+
 impl<S: NodeSink> BlockBuilder<'_, S> {
     /// Simplifies and writes a node that is not a leaf, or leaves it out.
     pub(super) fn coarse_node(
@@ -156,7 +161,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let Attempt { coarse, reason, kept, within_budget } = self.attempt(&source, &node);
         let NodeSurface { original, below, .. } = source;
         let Coarse { simplified: Simplified { mesh, border, step, .. }, spans, skirts } = coarse;
-        let (outcome, below) = if kept.least() < self.options.constants.outline.least_kept {
+        let (outcome, below) = if !self.keeps_enough(&kept, step) {
             let triangles = (mesh.triangles.len() + triangles_of(&skirts)) as u64;
             let child_path = node.child_path.to_vec();
             // Nobody draws it: what is above need not be farther off than what is below.
@@ -213,12 +218,13 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
                 || outline.as_ref().map_or_else(OutlineCoverage::default, |o| o.kept_by(mesh));
             self.stages.time(Stage::Measure, kept)
         };
-        let simplified = |ladder: &NodeLadder, budget: usize| {
-            self.stages.time(Stage::Simplify, || self.simplified(ladder, node, budget))
+        let simplified = |ladder: &NodeLadder, budget: usize, bodies: BodyPlacement| {
+            self.stages.time(Stage::Simplify, || self.simplified(ladder, node, budget, bodies))
         };
         let (ladder, first, reason) =
             self.stages.time(Stage::Simplify, || self.ladder(source, node));
-        let mut coarse = first.unwrap_or_else(|| simplified(&ladder, node.budget));
+        let mut coarse =
+            first.unwrap_or_else(|| simplified(&ladder, node.budget, BodyPlacement::InPlace));
         let mut kept = kept_by(&coarse);
         let mut within_budget = None;
         let mut budget = node.budget as f64;
@@ -226,10 +232,25 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         while kept.least() < constants.least_kept && budget < most {
             budget = most.min(budget * more_triangles(kept.least(), constants));
             within_budget = within_budget.or(Some(kept));
-            coarse = simplified(&ladder, budget as usize);
+            coarse = simplified(&ladder, budget as usize, BodyPlacement::InPlace);
             kept = kept_by(&coarse);
         }
+        let is_heavy = source.below.triangles() > HEAVY * node.budget;
+        if kept.least() < constants.least_kept && is_heavy {
+            let spread = simplified(&ladder, node.budget, BodyPlacement::Spread);
+            let kept_spread = kept_by(&spread);
+            if self.keeps_enough(&kept_spread, spread.simplified.step) {
+                (coarse, kept) = (spread, kept_spread);
+            }
+        }
         Attempt { coarse, reason, kept, within_budget }
+    }
+
+    /// Tells whether a node keeps enough of the outline of its source to be drawn in its place. Boxes that stand
+    /// for bodies nearby cover as much ground, if not the same.
+    fn keeps_enough(&self, kept: &OutlineCoverage, step: LadderStep) -> bool {
+        let kept = if step == LadderStep::Boxes { kept.covered() } else { kept.least() };
+        kept >= self.options.constants.outline.least_kept
     }
 
     /// Prepares the simplification of a node. If it reaches the budget within texture seams, that result is
@@ -250,7 +271,7 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
         let mut reason = plan.always.or(source.baked.then_some(BakeReason::Below));
         if reason.is_none() {
             let within_seams = ladder(mesh, border.clone(), false);
-            let coarse = self.simplified(&within_seams, node, node.budget);
+            let coarse = self.simplified(&within_seams, node, node.budget, BodyPlacement::InPlace);
             let Simplified { mesh, step, .. } = &coarse.simplified;
             let keeps_seams = matches!(step, LadderStep::Collapse | LadderStep::Cards);
             reason = plan.reason(mesh, keeps_seams);
@@ -300,13 +321,19 @@ impl<S: NodeSink> BlockBuilder<'_, S> {
     }
 
     /// The surfaces' result for a budget, with its sections capped and its skirts.
-    fn simplified(&self, with: &NodeLadder, node: &CoarseNode, budget: usize) -> Coarse {
+    fn simplified(
+        &self,
+        with: &NodeLadder,
+        node: &CoarseNode,
+        budget: usize,
+        bodies: BodyPlacement,
+    ) -> Coarse {
         let NodeLadder { source, mesh, border, normal_sets, spans, rules, surfaces, .. } = with;
         let path = node.path;
         // Skirts count towards the budget, but may not take more than half of it.
         let target = budget.saturating_sub(with.skirt_triangles).max(budget / 2).max(1);
         let fallback = || fallback_triangles(source, border, FALLBACK_TRIANGLES.min(target));
-        let mut result = surfaces.simplified(target).unwrap_or_else(fallback);
+        let mut result = surfaces.simplified(target, bodies).unwrap_or_else(fallback);
         if self.quantization.is_some() {
             result = self.snapped(result);
         }

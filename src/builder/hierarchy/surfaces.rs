@@ -6,7 +6,7 @@
 
 use crate::builder::border::vertex::{Border, Path};
 use crate::builder::simplify::cards::Cards;
-use crate::builder::simplify::ladder::{Ladder, Method, locked_vertices};
+use crate::builder::simplify::ladder::{BodyPlacement, Ladder, Method, locked_vertices};
 use crate::builder::simplify::simplified::Simplified;
 use crate::mesh::{AlphaMode, Mesh};
 
@@ -90,11 +90,18 @@ impl<'a> NodeSurfaces<'a> {
     }
 
     /// Simplifies all of them to about `target` triangles together; `None` where there is nothing.
-    pub fn simplified(&self, target: usize) -> Option<Simplified> {
+    pub fn simplified(&self, target: usize, bodies: BodyPlacement) -> Option<Simplified> {
         let share = |share: f64| ((target as f64 * share).round() as usize).max(1);
         let joined = |ladders: &[Shared<Ladder>]| {
-            let all = ladders.iter().map(|(ladder, of_all)| ladder.simplified(share(*of_all)));
-            all.reduce(join)
+            // Boxes of bodies that are in each other stay so where surfaces have equally many for each body.
+            let all: usize = ladders.iter().map(|(ladder, _)| ladder.bodies()).sum();
+            let is_by_bodies = bodies == BodyPlacement::Spread
+                && ladders.iter().all(|(ladder, _)| ladder.bodies() > 0);
+            let simplified = |(ladder, of_all): &Shared<Ladder>| {
+                let by_bodies = ladder.bodies() as f64 / all as f64;
+                ladder.simplified(share(if is_by_bodies { by_bodies } else { *of_all }), bodies)
+            };
+            ladders.iter().map(simplified).reduce(join)
         };
         let without_cards = joined(&self.ladders)?;
         let Some((ladders, (cards, of_all))) = &self.with_cards else {

@@ -9,6 +9,7 @@ use glam::{DVec2, DVec3};
 
 use crate::builder::border::vertex::Border;
 use crate::builder::simplify::compact::with_triangles;
+use crate::builder::simplify::morton::places;
 use crate::builder::simplify::parts::{Part, parts};
 use crate::builder::simplify::simplified::{LadderStep, Simplified};
 use crate::mesh::{Mesh, UpAxis, wide};
@@ -22,9 +23,6 @@ const WIDEST: f64 = 4.0;
 
 /// The card that stays in one place has at least this share of the area of the largest one there.
 const LARGE: f64 = 0.75;
-
-/// Bits of a place along each axis.
-const BITS: u32 = 16;
 
 /// A card and where it is.
 struct Card {
@@ -72,7 +70,8 @@ impl Cards {
                 }
             }
         }
-        let places = places(&cards);
+        let middles: Vec<DVec3> = cards.iter().map(|card| card.middle).collect();
+        let places = places(&middles);
         let mut order: Vec<usize> = (0..cards.len()).collect();
         order.sort_by_key(|&card| (cards[card].material, places[card]));
         let mut cards: Vec<Option<Card>> = cards.into_iter().map(Some).collect();
@@ -293,23 +292,6 @@ fn bounds(cards: &[Card]) -> [DVec2; 2] {
     let low = corners(-1.0).fold(DVec2::INFINITY, DVec2::min);
     let high = corners(1.0).fold(DVec2::NEG_INFINITY, DVec2::max);
     [low, high]
-}
-
-/// The place of each card along a Morton curve.
-fn places(cards: &[Card]) -> Vec<u64> {
-    let low = cards.iter().map(|card| card.middle).fold(DVec3::INFINITY, DVec3::min);
-    let high = cards.iter().map(|card| card.middle).fold(DVec3::NEG_INFINITY, DVec3::max);
-    let cells = f64::from((1u32 << BITS) - 1);
-    let scale = cells / (high - low).max_element().max(f64::MIN_POSITIVE);
-    let place = |card: &Card| {
-        let cell = ((card.middle - low) * scale).clamp(DVec3::ZERO, DVec3::splat(cells));
-        let [x, y, z] = cell.to_array().map(|value| value as u64);
-        (0..BITS).fold(0, |place, bit| {
-            let of = |value: u64, axis: u32| (value >> bit & 1) << (3 * bit + axis);
-            place | of(x, 0) | of(y, 1) | of(z, 2)
-        })
-    };
-    cards.iter().map(place).collect()
 }
 
 #[cfg(test)]

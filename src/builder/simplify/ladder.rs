@@ -1,7 +1,7 @@
 //! Simplification of a node to its triangle budget, by methods that change ever more.
 //!
 //! 1. Extruded footprints (`crate::builder::simplify::aggregate`), where the mesh has so many separate
-//!    bodies that the budget leaves few triangles to each.
+//!    bodies that the budget leaves few triangles to each; or fewer and larger boxes ([`BodyPlacement`]).
 //! 2. Elsewhere quadric edge collapse with attributes (Garland & Heckbert as meshoptimizer has it, with
 //!    vertex positions and attributes solved for afterwards), inside texture seams.
 //! 3. Where that misses the budget, or moves the surface far for the triangles that it leaves,
@@ -41,6 +41,15 @@ pub enum Simplifier {
     Qem,
     /// Vertex clustering alone (Cozzi & Loo, section 3).
     Clustering,
+}
+
+/// What stands for many separate bodies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BodyPlacement {
+    /// Prisms where they are; of those that stand apart the largest alone, where there are few triangles.
+    InPlace,
+    /// Fewer and larger boxes, which cover as much ground.
+    Spread,
 }
 
 /// A node may exceed its budget by this factor before the ladder goes on.
@@ -114,7 +123,7 @@ impl<'a> Ladder<'a> {
     }
 
     /// Simplifies to at most about `target` triangles.
-    pub fn simplified(&self, target: usize) -> Simplified {
+    pub fn simplified(&self, target: usize, for_bodies: BodyPlacement) -> Simplified {
         let Self { source, locked, method, .. } = self;
         if method.simplifier == Simplifier::Clustering {
             return clustered(&source.mesh, &source.border, locked, target);
@@ -123,7 +132,7 @@ impl<'a> Ladder<'a> {
             return source.clone();
         }
         let limit = (target as f64 * BUDGET_TOLERANCE) as usize;
-        let mut simplified = self.nearest(target, limit);
+        let mut simplified = self.nearest(target, limit, for_bodies);
         let reach = method.constants.simplify.far_part * target_edge(&source.mesh, target);
         keep_far_parts(&mut simplified, source, locked, reach, limit, method);
         simplified
@@ -138,10 +147,10 @@ impl<'a> Ladder<'a> {
     }
 
     /// The result of the ladder's steps that is nearest to the source.
-    fn nearest(&self, target: usize, limit: usize) -> Simplified {
+    fn nearest(&self, target: usize, limit: usize, for_bodies: BodyPlacement) -> Simplified {
         let Self { source, locked, method, .. } = self;
         let constants = method.constants;
-        let prisms = self.extruded(target);
+        let prisms = self.extruded(target, for_bodies);
         if let Some(prisms) = prisms.filter(|prisms| prisms.mesh.triangles.len() <= limit) {
             return prisms;
         }
@@ -188,19 +197,36 @@ impl<'a> Ladder<'a> {
         best.1
     }
 
-    /// Extruded bodies with the rest simplified by edge collapse; `None` where there are few bodies.
-    fn extruded(&self, target: usize) -> Option<Simplified> {
+    fn components(&self) -> &Components {
         let Self { source, locked, method, .. } = self;
+        self.bodies.get_or_init(|| Components::of(&source.mesh, locked, &method.bodies()))
+    }
+
+    /// How many separate bodies it has.
+    pub fn bodies(&self) -> usize {
+        self.components().count()
+    }
+
+    /// Extruded bodies with the rest simplified by edge collapse; `None` where there are few bodies.
+    fn extruded(&self, target: usize, for_bodies: BodyPlacement) -> Option<Simplified> {
+        let Self { source, method, .. } = self;
         if !self.tries(LadderStep::Prisms) {
             return None;
         }
         let rules = method.bodies();
-        let bodies = self.bodies.get_or_init(|| Components::of(&source.mesh, locked, &rules));
+        let bodies = self.components();
         if !bodies.are_many(target, &rules) {
             return None;
         }
-        let Extruded { prisms, rest } = bodies.extruded(&source.mesh, target, &rules)?;
-        let step = LadderStep::Prisms;
+        let (extruded, step) = match for_bodies {
+            BodyPlacement::InPlace => {
+                (bodies.extruded(&source.mesh, target, &rules), LadderStep::Prisms)
+            }
+            BodyPlacement::Spread => {
+                (bodies.spread(&source.mesh, target, rules.up), LadderStep::Boxes)
+            }
+        };
+        let Extruded { prisms, rest } = extruded?;
         let for_rest = target.saturating_sub(prisms.triangles.len()).max(1);
         let rest = Mesh { triangles: rest.to_vec(), ..source.mesh.clone() };
         let mut result = if rest.triangles.len() > for_rest {
@@ -337,7 +363,8 @@ mod tests {
                 without: None,
                 constants,
             };
-            Ladder::new(&mesh, &border, &Path::default(), 0, method).simplified(target)
+            Ladder::new(&mesh, &border, &Path::default(), 0, method)
+                .simplified(target, BodyPlacement::InPlace)
         };
         let few = simplified(600);
         assert_eq!(few.step, LadderStep::Prisms);

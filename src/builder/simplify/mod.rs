@@ -11,6 +11,7 @@ pub mod fallback;
 mod far_parts;
 pub mod ladder;
 pub mod merge;
+mod morton;
 pub mod normal_sets;
 mod one_sheet;
 pub mod orient;

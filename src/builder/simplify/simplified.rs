@@ -54,6 +54,8 @@ pub enum LadderStep {
     Clustering,
     /// Extruded footprints in place of separate bodies, and edge collapse of the rest.
     Prisms,
+    /// Fewer and larger boxes in place of separate bodies, and edge collapse of the rest.
+    Boxes,
     /// Fewer and larger cards of leaves.
     Cards,
     /// The largest triangles alone, where simplification would leave nothing.
@@ -70,6 +72,7 @@ impl LadderStep {
             Self::Oriented => "edge collapse of faces turned one way",
             Self::Clustering => "vertex clustering",
             Self::Prisms => "extruded footprints of separate bodies",
+            Self::Boxes => "fewer and larger boxes for separate bodies",
             Self::Cards => "fewer and larger cards",
             Self::Fallback => "the largest triangles alone",
         }

@@ -1,6 +1,6 @@
 //! What roofs and walls look like.
 
-use crate::mesh::{Coordinate, Mesh};
+use crate::mesh::{Coordinate, Mesh, Normal};
 
 /// What a roof or a wall looks like.
 #[derive(Clone, Copy)]
@@ -9,6 +9,24 @@ pub(super) struct Appearance {
     pub(super) vertex: u32,
     /// Linear, 0 to 65535.
     pub(super) color: [f64; 4],
+}
+
+impl Appearance {
+    /// Adds a vertex that looks so to a mesh that stands for a part of `mesh`; its number.
+    pub(super) fn push(&self, result: &mut Mesh, mesh: &Mesh, position: [f32; 3]) -> u32 {
+        result.positions.push(position);
+        result.materials.push(mesh.materials[self.vertex as usize]);
+        if !mesh.texcoords.is_empty() {
+            result.texcoords.push([0.0; 2]);
+        }
+        if !mesh.colors.is_empty() {
+            result.colors.push(self.color.map(|channel| channel.round() as u16));
+        }
+        if !mesh.normals.is_empty() {
+            result.normals.push(Normal::NONE);
+        }
+        result.positions.len() as u32 - 1
+    }
 }
 
 /// What triangles look like on average.

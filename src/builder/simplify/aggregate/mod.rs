@@ -1,4 +1,4 @@
-//! Extruded footprints in place of many small separate bodies.
+//! Extruded footprints in place of many small separate bodies, or fewer and larger boxes.
 //!
 //! Edge collapse never joins parts that do not touch. Where a node may spend but a few triangles on
 //! each of hundreds of buildings, most fall to slivers or go, and with them the volume and the
@@ -6,10 +6,14 @@
 //! height, over their footprint, as high as their roofs are on average, always what changes least of
 //! what is seen from above and from the sides.
 //!
+//! Where they stand too far apart for that, few of them stay as they are, and a coarse node that has to show
+//! most of them is as heavy as its children. Then there are fewer and larger [`boxes`].
+//!
 //! Those that go on beyond a border, and what is no body (the ground, roads, fences) stay as they
 //! are.
 
 mod appearance;
+mod boxes;
 mod extrudable;
 mod prisms;
 
@@ -110,6 +114,11 @@ impl Components {
         Self { bodies, rest, share: in_bodies / area, footprints: OnceCell::new() }
     }
 
+    /// How many bodies there are.
+    pub fn count(&self) -> usize {
+        self.bodies.len()
+    }
+
     /// Tells whether prisms stand for them in a node with so many triangles.
     pub fn are_many(&self, target: usize, rules: &ComponentRules) -> bool {
         are_many(self.bodies.len(), target, rules)
@@ -124,17 +133,30 @@ impl Components {
         target: usize,
         rules: &ComponentRules,
     ) -> Option<Extruded<'_>> {
-        let Self { bodies, rest, share, footprints } = self;
+        let Self { bodies, rest, footprints, .. } = self;
         if bodies.is_empty() {
             return None;
         }
-        // Prisms get the triangles that the rest does not need.
-        let for_bodies = (target as f64 * share).max(target as f64 - rest.len() as f64);
-        let most = (for_bodies as usize).max(LEAST_TRIANGLES);
+        let most = self.share_of(target);
         let made = || Footprints::of(mesh, bodies, most, rules);
         let footprints = footprints.get_or_init(made).as_ref()?;
         let prisms = footprints.prisms(mesh, bodies, most, rules)?;
         Some(Extruded { prisms, rest })
+    }
+
+    /// The same with fewer and larger boxes ([`boxes`]), which do not stand where the bodies do; `None` where
+    /// there are no bodies.
+    pub fn spread(&self, mesh: &Mesh, target: usize, up: UpAxis) -> Option<Extruded<'_>> {
+        let Self { bodies, rest, .. } = self;
+        let boxes = || boxes::boxes(mesh, bodies, self.share_of(target), up);
+        (!bodies.is_empty()).then(|| Extruded { prisms: boxes(), rest })
+    }
+
+    /// Of so many triangles, those for bodies: they get what the rest does not need.
+    fn share_of(&self, target: usize) -> usize {
+        let target = target as f64;
+        let for_bodies = (target * self.share).max(target - self.rest.len() as f64);
+        (for_bodies as usize).max(LEAST_TRIANGLES)
     }
 }
 

@@ -10,6 +10,10 @@ use crate::mesh::{Coordinate, Mesh, UpAxis, wide};
 pub(in super::super) struct Body {
     /// What it covers of the ground, about, square metres.
     pub footprint: f64,
+    /// The height of its lowest point, metres.
+    pub low: f64,
+    /// By how much its roofs are above that on average, metres.
+    pub height: f64,
     pub roof: Appearance,
     pub wall: Appearance,
 }
@@ -53,6 +57,6 @@ impl Body {
         let size: DVec2 = (high - low).truncate();
         let is_body = height > constants.least_height * footprint.sqrt()
             && walls >= constants.least_walls * 2.0 * size.element_sum() * height;
-        is_body.then_some(Self { footprint, roof, wall })
+        is_body.then_some(Self { footprint, low: low.z, height, roof, wall })
     }
 }

@@ -27,7 +27,7 @@ use super::ComponentRules;
 use super::appearance::Appearance;
 use crate::builder::constants::PrismConstants;
 use crate::builder::simplify::parts::Part;
-use crate::mesh::{Mesh, Normal, UpAxis, wide};
+use crate::mesh::{Mesh, UpAxis, wide};
 
 /// The bodies of a mesh as regions of a grid, from which prisms are made for one budget or several.
 pub(super) struct Footprints {
@@ -187,18 +187,7 @@ impl Walls<'_> {
     fn push(&self, result: &mut Mesh, corner: DVec2, height: f64, look: &Appearance) -> u32 {
         let place = self.heights.grid.place(corner).extend(height);
         let place: DVec3 = self.up.from_z_up(place);
-        result.positions.push(place.as_vec3().to_array());
-        result.materials.push(self.mesh.materials[look.vertex as usize]);
-        if !self.mesh.texcoords.is_empty() {
-            result.texcoords.push([0.0; 2]);
-        }
-        if !self.mesh.colors.is_empty() {
-            result.colors.push(look.color.map(|channel| channel.round() as u16));
-        }
-        if !self.mesh.normals.is_empty() {
-            result.normals.push(Normal::NONE);
-        }
-        result.positions.len() as u32 - 1
+        look.push(result, self.mesh, place.as_vec3().to_array())
     }
 
     fn roof(&self, result: &mut Mesh, polygon: &[Vec<DVec2>], height: f64, look: Appearance) {
