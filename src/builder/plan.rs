@@ -84,7 +84,8 @@ impl Plan {
     pub fn share(&self, subset: Subset) -> Result<Range<usize>> {
         if self.blocks.len() < subset.of as usize {
             return Err(Error::Usage(format!(
-                "--subset {subset}: expected as many subsets as there are blocks at most, found {}",
+                "--subset {subset}: expected at most as many subsets as there are blocks, found {}; \
+                 build the city in one go, or in smaller blocks, as with --blocks grid:200",
                 self.blocks.len()
             )));
         }

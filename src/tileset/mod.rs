@@ -15,6 +15,7 @@
 //! affine, so blocks, and pieces of large blocks, have small transforms of their own.
 
 mod files;
+mod first_view;
 mod placed;
 mod regions;
 mod rules;
@@ -24,6 +25,7 @@ mod tile;
 mod walk;
 
 pub use files::{MOST_TILES, TilesetFile, files};
+pub use first_view::FirstView;
 pub use rules::{Checked, Fault, check};
 
 /// The version of 3D Tiles that is written.

@@ -247,7 +247,7 @@ fn transform(value: Option<&Value>) -> Option<DAffine3> {
 }
 
 /// Where a reference of a file points, relative to the folder; `None` where that is outside.
-fn within(file: &str, uri: &str) -> Option<String> {
+pub(super) fn within(file: &str, uri: &str) -> Option<String> {
     let mut path = PathBuf::from(file);
     path.pop();
     for part in Path::new(uri).components() {

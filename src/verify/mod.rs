@@ -81,6 +81,7 @@ use crate::format::{SCENE_FILE, Scene};
 use crate::lattice::Quantization;
 use crate::mesh::OutlineCoverage;
 use crate::place::placement_of;
+use crate::tileset::FirstView;
 use crate::{Error, Result};
 
 /// Verifies the scene in `out` against the models that it was built from; without any, against
@@ -100,6 +101,7 @@ pub fn verify(
         options: options.clone(),
         passed: false,
         scene: None,
+        first_view: None,
         checks: Vec::new(),
         leaves: None,
         levels: Vec::new(),
@@ -165,6 +167,7 @@ impl Verification<'_> {
         let leaves = tree::leaves(scene);
         let steps = step::steps(scene);
         report.scene = Some(facts(scene, &leaves, &geometry, &steps));
+        report.first_view = Some(FirstView::of(out));
         let rims = seams::Rims::new(&leaves, &geometry);
         let seams = rims.seams();
         let between = rims.between_vertices();

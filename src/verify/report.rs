@@ -6,6 +6,7 @@ use super::options::VerifyOptions;
 use crate::cells::SeenFaces;
 use crate::format::NodeId;
 use crate::mesh::OutlineCoverage;
+use crate::tileset::FirstView;
 use crate::{Error, Result};
 
 /// Failures of one check that are listed; the others are counted.
@@ -29,6 +30,8 @@ pub struct VerifyReport {
     pub passed: bool,
     /// Facts of the scene; `None` where it could not be read.
     pub scene: Option<SceneFacts>,
+    /// What a viewer needs for the first picture of the whole; `None` where the scene could not be read.
+    pub first_view: Option<FirstView>,
     /// All checks, in the order in which they were made.
     pub checks: Vec<Check>,
     /// Leaves against the source; `None` without a source.

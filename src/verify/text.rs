@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::report::{Check, Distance, VerifyReport};
+use crate::tileset::FirstView;
 
 /// The report as text.
 pub fn text(report: &VerifyReport) -> String {
@@ -94,6 +95,13 @@ pub fn text(report: &VerifyReport) -> String {
         line(format!(
             "\nVisible area of cut-outs, as of trees, in % of that of the leaves, by level: {}",
             kept.join(", ")
+        ));
+    }
+    if let Some(FirstView { requests, bytes, tiles, draws }) = report.first_view {
+        line(format!(
+            "\nFirst view of the whole, 1,080 rows, 16 pixels: {requests} requests, {:.1} MB, {tiles} tiles, \
+             {draws} draw calls",
+            bytes as f64 / 1e6
         ));
     }
     if !report.worst_nodes.is_empty() {
