@@ -318,8 +318,7 @@ impl Outline {
 }
 
 impl OutlineCoverage {
-    /// The ground that is covered, be it that of the source or beside it, over that of the source; 1 where the
-    /// source covers none.
+    /// Returns the area of the covered ground, anywhere, over that of the source; 1 where the source covers none.
     pub fn covered(&self) -> f64 {
         self.area.zip(self.area_added).map_or(1.0, |(kept, added)| kept + added)
     }

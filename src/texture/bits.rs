@@ -79,7 +79,7 @@ impl BitGrid {
         coarse
     }
 
-    /// Some rows as a grid of their own.
+    /// Returns some rows as a grid of their own.
     pub fn rows(&self, rows: Range<usize>) -> Self {
         let words = self.words[rows.start * self.stride..rows.end * self.stride].to_vec();
         Self { height: rows.len(), words, ..*self }

@@ -96,14 +96,14 @@ pub(super) struct AtlasSource {
     pub channels: usize,
     /// The region and its halves, down to the resolution of the root; the coarsest first.
     pub pyramid: Vec<LevelImage>,
-    /// By level: the region at its resolution, once a node asked for it, where it is none of the pyramid's.
+    /// By level, the region at its resolution if that is none of the pyramid's. It is made when a node asks for it.
     levels: Vec<OnceLock<LevelImage>>,
 }
 
 impl AtlasSource {
-    /// The region at the resolution of a level, where one texel stands for `step` along each axis.
+    /// Returns the region at the resolution of a level, whose texels are `step` source texels wide.
     pub fn level(&self, level: usize, step: f64) -> Option<&LevelImage> {
-        // Steps are square roots: those of halves are so to rounding.
+        // Steps are square roots, and equal to powers of two only up to rounding.
         let is_fine = |image: &&LevelImage| image.step <= step * (1.0 + 1e-9);
         let finer = self.pyramid.iter().find(is_fine).or(self.pyramid.last())?;
         if step <= finer.step * (1.0 + 1e-9) {

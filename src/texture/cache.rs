@@ -73,17 +73,17 @@ impl ImageKey {
     }
 }
 
-/// So many bytes of decoded images are kept for blocks that have not taken them yet. To decode an image
-/// once more takes a tenth of the time in which a block's textures are made from it.
+/// At most so many bytes of decoded images are kept for blocks that have not taken them yet. Decoding an image
+/// again takes a tenth of the time that making a block's textures from it takes.
 const MOST_KEPT: u64 = 128 << 20;
 
 /// The decoded images of a build. Each is decoded when the first block takes it, and let go of when all
-/// that have announced themselves have taken it, or when others taken since have so many bytes that they
-/// fill the memory that there is for images.
+/// that have announced themselves have taken it, or when images taken since
+/// have more bytes than are kept.
 #[derive(Debug)]
 pub struct DecodedImages {
     slots: Mutex<FxHashMap<ImageKey, Arc<Slot>>>,
-    /// Images that somebody has yet to take, and their bytes; the one taken last comes last.
+    /// Images that some block has not taken yet, and their bytes; the one taken last comes last.
     kept: Mutex<VecDeque<(Arc<Slot>, u64)>>,
     /// See [`MOST_KEPT`].
     most_kept: u64,
@@ -146,8 +146,11 @@ impl DecodedImages {
         }
     }
 
-    /// Keeps an image for those that have not taken it yet.
+    /// Keeps an image for the blocks that have not taken it yet.
     fn keep(&self, slot: &Arc<Slot>, bytes: u64) {
+        if bytes > self.most_kept {
+            return slot.forget();
+        }
         let mut forgotten = Vec::new();
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.retain(|(other, _)| !Arc::ptr_eq(other, slot));
@@ -193,7 +196,7 @@ struct Slot {
 }
 
 impl Slot {
-    /// Lets go of the image, which is decoded again for who takes it next.
+    /// Drops the image. It is decoded again when it is taken next.
     fn forget(&self) {
         let mut image = self.image.lock().unwrap_or_else(PoisonError::into_inner);
         if matches!(image.0, State::Decoded(_)) {
@@ -363,7 +366,7 @@ mod tests {
             warnings: Warnings::default(),
         };
         let plan = TexturePlan::new(&model);
-        // Of two blocks that take three images of 192 bytes each, one by one.
+        // Two blocks take three images of 192 bytes each, one by one. Returns which of them they share.
         let shared = |most_kept| {
             let images = DecodedImages { most_kept, ..DecodedImages::default() };
             let announced = [(); 2].map(|()| images.announce(&model, &plan, 0..3));

@@ -30,12 +30,12 @@ enum Pixels {
     /// The source's own, from this column and row on.
     Source(Arc<DecodedTexture>, [usize; 2]),
     Own(Vec<u8>),
-    /// Those that are used, of an image of which much is not.
+    /// Only tiles with used texels, of an image of which much is not used.
     Used(Tiles),
 }
 
 impl LevelImage {
-    /// Copies the texels of a row from `start` on; the caller keeps to the size.
+    /// Copies texels of a row, from `start` on, which must lie inside of the image.
     pub fn copy_row(&self, y: usize, start: usize, texels: &mut [u8]) {
         match &self.pixels {
             Pixels::Source(image, [left, top]) => {
@@ -50,7 +50,7 @@ impl LevelImage {
         }
     }
 
-    /// So many texels of a row from `start` on.
+    /// Returns `count` texels of a row, from `start` on.
     #[cfg(test)]
     pub fn texels(&self, y: usize, start: usize, count: usize) -> Vec<u8> {
         let mut texels = vec![0; count * self.channels];
@@ -58,7 +58,7 @@ impl LevelImage {
         texels
     }
 
-    /// The texels of a row, which are copied to `copy` where they do not lie side by side.
+    /// Returns the texels of a row. They are copied to `copy` if they do not lie side by side.
     fn row<'a>(&'a self, y: usize, copy: &'a mut Vec<u8>) -> &'a [u8] {
         let bytes = self.size[0] * self.channels;
         match &self.pixels {
@@ -116,7 +116,7 @@ impl LevelImage {
         Self { size, channels: 3, step, pixels: Pixels::Own(self.halved_rgb()) }
     }
 
-    /// The same with a texel for so many source texels along each axis, which are not fewer than now.
+    /// Returns the image with texels that are `step` source texels wide, no fewer than now.
     pub fn at_step(&self, step: f64) -> Self {
         let image = scale::area(&mut ImageRows::of(self), [step / self.step; 2]);
         let (size, pixels) = ([image.width, image.height], bytes(&image, self.channels));
@@ -186,11 +186,11 @@ fn bytes(image: &LinearImage, channels: usize) -> Vec<u8> {
     pixels
 }
 
-/// Makes a region's image and its halves, as long as one texel stands for at most `most` along each axis; the
-/// coarsest comes first.
+/// Makes the image of a region and its halves, down to texels that are `most` source texels wide. The coarsest
+/// comes first.
 ///
-/// What is not used and not near is left out where this is much. Unused texels near used ones take these's
-/// colours first, so that no mean mixes in a foreign one.
+/// Unused texels near used ones take the colours of these first, so that no mean mixes in a foreign one. If most
+/// texels are neither used nor near used ones, these are not kept.
 pub(crate) fn pyramid(image: Arc<DecodedTexture>, region: &Region, most: f64) -> Vec<LevelImage> {
     let mut levels = vec![source_level(image, region)];
     let mut used = region.covered.clone();
@@ -214,7 +214,7 @@ pub(crate) fn pyramid(image: Arc<DecodedTexture>, region: &Region, most: f64) ->
 fn source_level(image: Arc<DecodedTexture>, region: &Region) -> LevelImage {
     let channels = usize::from(image.channels);
     let level = |pixels| LevelImage { size: region.size, channels, step: 1.0, pixels };
-    if let Some(origin) = region.is_best_shared(&image) {
+    if let Some(origin) = region.first_if_shared(&image) {
         return level(Pixels::Source(image, origin));
     }
     let mut rows = RegionRows::new(&image, region);
@@ -294,10 +294,11 @@ pub(crate) fn resize_whole(image: &Arc<DecodedTexture>, size: [usize; 2]) -> Dec
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn image(width: usize, height: usize, channels: u8) -> Arc<DecodedTexture> {
+    /// Makes an image whose bytes differ from their neighbours.
+    pub fn image(width: usize, height: usize, channels: u8) -> Arc<DecodedTexture> {
         let pixels =
             (0..width * height * usize::from(channels)).map(|i| (i * 7 % 251) as u8).collect();
         Arc::new(DecodedTexture { width: width as u32, height: height as u32, channels, pixels })
@@ -345,8 +346,8 @@ mod tests {
         for level in halves.iter().chain(&between) {
             for y in 0..level.size[1] {
                 for (x, texel) in level.texels(y, 0, level.size[0]).chunks(3).enumerate() {
-                    // Sixteen texels along one axis are as many or more on the diagonal, of an image that is
-                    // scaled again two thirds of them.
+                    // Colours are extended by sixteen texels along one axis, which are as many or more on the
+                    // diagonal. Of an image that is scaled by 1.5, two thirds of them are left.
                     let distance = (x as f64).hypot(y as f64) - 50.0 / level.step;
                     if distance < 10.0 {
                         assert!(texel[0].abs_diff(180) <= 1 && texel[1].abs_diff(90) <= 1);

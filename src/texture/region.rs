@@ -23,9 +23,9 @@ pub(crate) struct Region {
 }
 
 impl Region {
-    /// Its first column and row, where it need not be copied: it lies inside of the image, all of it is
-    /// used, and the rest of the image is not larger.
-    pub fn is_best_shared(&self, image: &DecodedTexture) -> Option<[usize; 2]> {
+    /// Returns its first column and row if the image itself can serve as its texels: the region lies inside of the
+    /// image, all of it is used, and the rest of the image is not larger.
+    pub fn first_if_shared(&self, image: &DecodedTexture) -> Option<[usize; 2]> {
         let sides = [image.width, image.height].map(i64::from);
         let is_inside = (0..2).all(|axis| {
             self.origin[axis] >= 0 && self.origin[axis] + self.size[axis] as i64 <= sides[axis]
@@ -36,14 +36,14 @@ impl Region {
     }
 }
 
-/// So many rows are made at once.
+/// The number of rows that are made at once.
 const BAND: usize = 128;
 
-/// The rows of a region, from the first on: unused texels near used ones have their neighbours' colours.
+/// The rows of a region. Unused texels near used ones have the colours of these.
 pub(crate) struct RegionRows<'a> {
     image: &'a DecodedTexture,
     region: &'a Region,
-    /// Rows of the region that are made.
+    /// The rows that are made.
     band: Range<usize>,
     /// Their texels, and those of rows before and after whose colours reach them.
     texels: Vec<u8>,
@@ -52,12 +52,12 @@ pub(crate) struct RegionRows<'a> {
 }
 
 impl<'a> RegionRows<'a> {
-    /// Nothing is made yet.
+    /// Prepares to make rows.
     pub fn new(image: &'a DecodedTexture, region: &'a Region) -> Self {
         Self { image, region, band: 0..0, texels: Vec::new(), first: 0 }
     }
 
-    /// The texels of a row; quick where rows are asked for in their order.
+    /// Returns the texels of a row. Rows are asked for in their order.
     pub fn row(&mut self, y: usize) -> &[u8] {
         if !self.band.contains(&y) {
             self.make(y);
@@ -80,7 +80,7 @@ impl<'a> RegionRows<'a> {
         fill::extend(texels, &covered.rows(rows), REACH);
     }
 
-    /// Copies rows of the image, which goes on at its other sides.
+    /// Copies rows of the region. Beyond a side, the image goes on at the opposite one.
     fn copy(&mut self, rows: Range<usize>) {
         let Region { origin, size, .. } = self.region;
         let [width, height] = [self.image.width, self.image.height].map(|side| side as usize);

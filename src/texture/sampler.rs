@@ -1,4 +1,4 @@
-//! Looking up colours of an image between its texels.
+//! Looks up colours of an image between its texels.
 
 use glam::{DVec2, Vec4};
 
@@ -26,13 +26,13 @@ enum Order<'a> {
 }
 
 impl<'a> Sampler<'a> {
-    /// An image of rows: `bytes` begin with its first texel, and there are `row` bytes from one row to the
-    /// next.
+    /// Samples an image whose rows follow each other: `bytes` begin with its first texel, and there are `row` bytes
+    /// from one row to the next.
     pub fn of_rows(bytes: &'a [u8], size: [usize; 2], channels: usize, row: usize) -> Self {
         Self::new(bytes, size, channels, Order::Rows(row))
     }
 
-    /// An image of tiles.
+    /// Samples an image of tiles.
     pub fn of_tiles(tiles: &'a Tiles, size: [usize; 2]) -> Self {
         Self::new(tiles.texels(), size, tiles.channels(), Order::Tiles(tiles))
     }
@@ -114,8 +114,8 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// The mean of a square of two by two texels of nine, of which the first counts so much less, and the
-    /// last so much, along each axis.
+    /// Returns the mean of a square of two by two texels that lies on three by three texels. `along` and `down` are
+    /// the shares of the last column and row, those of the first are 1 less these.
     #[inline]
     fn mean(
         &self,
@@ -132,8 +132,8 @@ impl<'a> Sampler<'a> {
         (one + (row(below) - one) * down + two) * 0.25
     }
 
-    /// Where the first texel of a window begins, and bytes from one of its rows to the next; `None` where it
-    /// lies in several tiles. First and last column and row.
+    /// Returns where the first texel of a window begins, and the bytes from one of its rows to the next; `None` if
+    /// it lies in several tiles. The window has a first and a last column and row.
     #[inline]
     fn window(&self, columns: [usize; 2], rows: [usize; 2]) -> Option<(usize, usize)> {
         let row = match self.order {
@@ -143,7 +143,7 @@ impl<'a> Sampler<'a> {
         Some((self.start(columns[0], rows[0]), row))
     }
 
-    /// Where a texel begins.
+    /// Returns where a texel begins.
     #[inline]
     fn start(&self, x: usize, y: usize) -> usize {
         match self.order {
@@ -165,16 +165,10 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::decode::DecodedTexture;
     use crate::texture::bits::BitGrid;
     use crate::texture::level::pyramid;
+    use crate::texture::level::tests::image;
     use crate::texture::region::Region;
-
-    fn image(width: usize, height: usize, channels: u8) -> Arc<DecodedTexture> {
-        let pixels =
-            (0..width * height * usize::from(channels)).map(|i| (i * 7 % 251) as u8).collect();
-        Arc::new(DecodedTexture { width: width as u32, height: height as u32, channels, pixels })
-    }
 
     #[test]
     fn wide_samples_are_means_of_two_by_two_texels_anywhere() {

@@ -1,5 +1,5 @@
-//! An image of which only the tiles are kept that something uses. A block of a scan uses charts that lie
-//! all over the images of the scan.
+//! An image of which only tiles with used texels are kept: the charts that a block of a scan uses lie scattered
+//! over large images.
 
 use super::bits::BitGrid;
 use crate::color;
@@ -7,16 +7,16 @@ use crate::color;
 /// Texels along each side of a tile; a power of two.
 pub(crate) const SIDE: usize = 16;
 
-/// Where more than this part of the tiles is used, all are kept: rows of a whole image are read faster.
+/// If more than this share of the tiles is used, the image is kept whole, whose rows are read faster.
 const MOST_KEPT: f64 = 0.75;
 
-/// The tiles of an image that are kept. All others have the mean colour of these and are transparent.
+/// The tiles of an image that are kept. All other texels have the mean colour of these and are transparent.
 #[derive(Clone, Debug)]
 pub(crate) struct Tiles {
     channels: usize,
-    /// Tiles in a row of tiles.
+    /// The number of tiles in a row of tiles.
     columns: usize,
-    /// By tile, row by row: its number among those that are kept, from 1 on; 0 is all others.
+    /// By tile, row by row, its number among those that are kept, from 1 on; 0 if it is not kept.
     numbers: Vec<u32>,
     /// The texels of each tile that is kept, row by row.
     texels: Vec<u8>,
@@ -52,7 +52,7 @@ impl Tiles {
         Some(Self { channels, columns, numbers, texels })
     }
 
-    /// Takes what is kept of a row of the image.
+    /// Takes over the texels of a row of the image that are kept.
     pub fn write_row(&mut self, y: usize, row: &[u8]) {
         let numbers = &self.numbers[y / SIDE * self.columns..][..self.columns];
         for (&number, texels) in numbers.iter().zip(row.chunks(SIDE * self.channels)) {
@@ -63,7 +63,7 @@ impl Tiles {
         }
     }
 
-    /// Gives what is not kept its colour, once all rows are written.
+    /// Computes the colour of texels that are not kept, once all rows are written.
     pub fn finish(&mut self) {
         let (light, byte) = (color::byte_to_light(), color::linear_to_byte());
         let length = SIDE * SIDE * self.channels;
@@ -81,12 +81,12 @@ impl Tiles {
         }
     }
 
-    /// Where a tile's part of a row of the image begins in `texels`.
+    /// Returns where a tile's part of a row of the image begins in `texels`.
     fn row_of(&self, number: u32, y: usize) -> usize {
         (number as usize * SIDE + y % SIDE) * SIDE * self.channels
     }
 
-    /// Copies the texels of a row from `start` on; the caller keeps to the image's size.
+    /// Copies texels of a row, from `start` on, which must lie inside of the image.
     pub fn copy_row(&self, y: usize, start: usize, texels: &mut [u8]) {
         let numbers = &self.numbers[y / SIDE * self.columns..][..self.columns];
         let mut skipped = start % SIDE;
@@ -103,25 +103,25 @@ impl Tiles {
         }
     }
 
-    /// 3 or 4.
+    /// Returns the number of channels, 3 or 4.
     pub fn channels(&self) -> usize {
         self.channels
     }
 
-    /// Bytes from one row to the next of a window that lies in one tile; `None` of any other. First and last
-    /// column and row.
+    /// Returns the bytes from one row to the next of a window with these first and last columns and rows; `None` if
+    /// it lies in several tiles.
     #[inline]
     pub fn row_within(&self, columns: [usize; 2], rows: [usize; 2]) -> Option<usize> {
         let is_one = |[first, last]: [usize; 2]| first / SIDE == last / SIDE;
         (is_one(columns) && is_one(rows)).then_some(SIDE * self.channels)
     }
 
-    /// All texels, of which that of a column and row begins at [`start`](Self::start).
+    /// Returns all texels. That of a column and row begins at [`start`](Self::start).
     pub fn texels(&self) -> &[u8] {
         &self.texels
     }
 
-    /// Where a texel begins among all.
+    /// Returns where a texel begins among all.
     #[inline]
     pub fn start(&self, x: usize, y: usize) -> usize {
         let number = self.numbers[y / SIDE * self.columns + x / SIDE];

@@ -1,4 +1,4 @@
-//! What a viewer loads and draws before the first picture of the whole is complete.
+//! Counts what a viewer loads and draws for the first complete picture of the whole.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -10,22 +10,22 @@ use serde_json::Value;
 use super::walk::{Seen, Walk};
 use crate::format::read_regular;
 
-/// Rows of the picture.
+/// The number of rows of the picture.
 const ROWS: f64 = 1080.0;
 
 /// A tile is drawn where its error is at most so many pixels, as CesiumJS has it by default.
 const MOST_PIXELS: f64 = 16.0;
 
-/// Seen from so many radii of the sphere around the whole, which then fits a vertical field of 60 degrees, from 45
-/// degrees above.
+/// The whole is seen from 45 degrees above, from so many radii of the sphere around it, which then fits a vertical
+/// field of 60 degrees.
 const DISTANCE: f64 = 2.0;
 
-/// What the first picture needs: 1,080 rows, the whole in view, at 16 pixels of error.
+/// The needs of the first picture: 1,080 rows, the whole in view, 16 pixels of error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct FirstView {
-    /// Files: tilesets, tiles that are drawn or above these, and images beside them.
+    /// Files that are loaded: tilesets, tiles that are drawn or above these, and images beside them.
     pub requests: usize,
-    /// Of all these.
+    /// The bytes of these files.
     pub bytes: u64,
     /// Tiles that are drawn.
     pub tiles: usize,
@@ -34,7 +34,8 @@ pub struct FirstView {
 }
 
 impl FirstView {
-    /// Finds it for the tileset of an output folder. Faults of the tileset are left out, as by [`super::check`].
+    /// Counts them for the tileset of an output folder. Tiles that do not hold what the specification asks for are
+    /// left out; [`super::check`] finds them.
     pub fn of(out: &Path) -> Self {
         let Walk { tiles, files, .. } = Walk::new(out);
         let Some(eye) = tiles.first().map(eye) else { return Self::default() };
@@ -43,7 +44,7 @@ impl FirstView {
         let mut requested: BTreeSet<String> = BTreeSet::new();
         for (number, tile) in tiles.iter().enumerate() {
             let file = file_of(tile);
-            // What refers to a file of tiles is nothing to be drawn.
+            // A tile that refers to another file is not drawn itself.
             let is_refined = |above: usize| {
                 let is_coarse = || pixels(&tiles[above], eye) > MOST_PIXELS;
                 is_loaded[above] && (file_of(&tiles[above]) != file || is_coarse())
@@ -71,12 +72,12 @@ impl FirstView {
     }
 }
 
-/// The file that has a tile.
+/// Returns the file that a tile is in.
 fn file_of(tile: &Seen) -> &str {
     tile.place.split(' ').next().unwrap_or_default()
 }
 
-/// Where the whole is seen from.
+/// Returns the point from which the whole is seen.
 fn eye(root: &Seen) -> DVec3 {
     let volume = root.volume;
     let radius = volume.corners().iter().map(|c| c.distance(volume.centre)).fold(0.0, f64::max);
@@ -84,7 +85,7 @@ fn eye(root: &Seen) -> DVec3 {
     root.to_whole.transform_point3(volume.centre + aside * radius * DISTANCE)
 }
 
-/// The error of a tile in pixels.
+/// Returns the error of a tile in pixels.
 fn pixels(tile: &Seen, eye: DVec3) -> f64 {
     let from = tile.to_whole.inverse().transform_point3(eye) - tile.volume.centre;
     let along = |half: DVec3| {
@@ -92,12 +93,12 @@ fn pixels(tile: &Seen, eye: DVec3) -> f64 {
         axis * from.dot(axis).clamp(-half.length(), half.length())
     };
     let outside = (from - tile.volume.half.into_iter().map(along).sum::<DVec3>()).length();
-    // Half of the rows at a distance of 1, by the half of the field.
+    // At a distance of 1, half of the rows cover the tangent of 30 degrees.
     let rows = ROWS * 0.5 / (1.0 / 3.0f64.sqrt());
     tile.error * rows / outside.max(f64::MIN_POSITIVE)
 }
 
-/// The primitives of a GLB and the images beside it; none where it cannot be read.
+/// Returns the number of primitives of a GLB, and the images beside it; none if it cannot be read.
 fn contents(out: &Path, file: &str) -> (usize, Vec<String>) {
     let read = || -> Option<Value> {
         let bytes = read_regular(&out.join(file)).ok()?;
@@ -116,7 +117,8 @@ fn contents(out: &Path, file: &str) -> (usize, Vec<String>) {
 mod tests {
     use super::*;
 
-    /// A box of 80 by 60 m with a root of this error, two leaves in another file, and an image beside each tile.
+    /// Writes a tileset of a box of 80 by 60 m: a root with this error, two leaves in another file, and an image that
+    /// all tiles share.
     fn written(error: f64) -> tempfile::TempDir {
         let out = tempfile::tempdir().unwrap();
         let volume = serde_json::json!({ "box": [40, 30, 0, 40, 0, 0, 0, 30, 0, 0, 0, 0] });

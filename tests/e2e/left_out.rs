@@ -118,7 +118,7 @@ fn a_node_that_keeps_enough_with_more_triangles_has_them() {
     build_with(&[folder.path().join("town.obj")], &out, &options(0.9));
     let levels = verified(&out).levels;
     assert!(levels[1].kept.least() > 0.9);
-    // With a quarter of the triangles the houses, which stand apart, are fewer and larger, and cover as much.
+    // On level 0, fewer and larger boxes stand for the houses, which stand apart, and cover as much ground.
     assert!(levels[0].kept.least() < 0.5);
     assert!((0.9..1.1).contains(&levels[0].kept.covered()), "{:?}", levels[0].kept);
     let report = report(&out);

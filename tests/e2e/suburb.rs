@@ -1,4 +1,4 @@
-//! Detached houses, more than a coarse node has triangles.
+//! Detached houses, of which there are more than a coarse node has triangles.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use crate::support::inputs::write;
 use crate::support::result::Built;
 use crate::support::{Random, build_with};
 
-/// `side` by `side` boxes about 10 m wide, 25 m apart, and nothing else.
+/// Writes `side` by `side` boxes about 10 m wide, 25 m apart, and nothing else.
 fn write_suburb(folder: &Path, side: usize) -> PathBuf {
     let mut random = Random::new(3, 0);
     let mut text = String::from("mtllib suburb.mtl\n");

@@ -147,8 +147,8 @@ fn lies_in_plane(corners: [[f32; 3]; 3], path: &Path) -> bool {
 }
 
 /// Bodies that stand apart become fewer and larger boxes where the node would not be written otherwise, and
-/// what is drawn in its place has more than this many times its triangles. That of one level that is not
-/// written has four times as many, which is less harm than boxes in other places.
+/// what is drawn in its place has more than this many times its triangles. Where one level alone is not written,
+/// it has four times as many, which is better than boxes in other places.
 const HEAVY: usize = 8;
 
 impl<S: NodeSink> BlockBuilder<'_, S> {

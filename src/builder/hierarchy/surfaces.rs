@@ -93,7 +93,7 @@ impl<'a> NodeSurfaces<'a> {
     pub fn simplified(&self, target: usize, bodies: BodyPlacement) -> Option<Simplified> {
         let share = |share: f64| ((target as f64 * share).round() as usize).max(1);
         let joined = |ladders: &[Shared<Ladder>]| {
-            // Boxes of bodies that are in each other stay so where surfaces have equally many for each body.
+            // If each surface has equally many boxes for a body, those of bodies inside of others are inside, too.
             let all: usize = ladders.iter().map(|(ladder, _)| ladder.bodies()).sum();
             let is_by_bodies = bodies == BodyPlacement::Spread
                 && ladders.iter().all(|(ladder, _)| ladder.bodies() > 0);

@@ -43,12 +43,12 @@ pub enum Simplifier {
     Clustering,
 }
 
-/// What stands for many separate bodies.
+/// Tells what stands for many separate bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BodyPlacement {
-    /// Prisms where they are; of those that stand apart the largest alone, where there are few triangles.
+    /// Prisms stand where the bodies do. Of bodies that stand apart only the largest stay if there are few triangles.
     InPlace,
-    /// Fewer and larger boxes, which cover as much ground.
+    /// Fewer and larger boxes cover as much ground.
     Spread,
 }
 
@@ -202,7 +202,7 @@ impl<'a> Ladder<'a> {
         self.bodies.get_or_init(|| Components::of(&source.mesh, locked, &method.bodies()))
     }
 
-    /// How many separate bodies it has.
+    /// Returns the number of its separate bodies.
     pub fn bodies(&self) -> usize {
         self.components().count()
     }

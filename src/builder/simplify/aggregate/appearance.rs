@@ -12,7 +12,7 @@ pub(super) struct Appearance {
 }
 
 impl Appearance {
-    /// Adds a vertex that looks so to a mesh that stands for a part of `mesh`; its number.
+    /// Adds a vertex of this appearance to a mesh that stands for a part of `mesh`. Returns its number.
     pub(super) fn push(&self, result: &mut Mesh, mesh: &Mesh, position: [f32; 3]) -> u32 {
         result.positions.push(position);
         result.materials.push(mesh.materials[self.vertex as usize]);

@@ -13,13 +13,13 @@ use crate::builder::simplify::parts::Part;
 use crate::mesh::{Mesh, UpAxis, wide};
 use crate::random::{hash, unit};
 
-/// Of a box without a floor, which nobody sees.
+/// A box has so many triangles. It has no floor, since nobody sees that.
 pub(super) const TRIANGLES: usize = 10;
 
 /// The body that stays in one place has at least this share of the footprint of the largest one there.
 const LARGE: f64 = 0.75;
 
-/// Boxes of about `target` triangles that cover as much ground as the bodies, and are as high on average.
+/// Makes boxes of about `target` triangles that cover as much ground as the bodies and have as much volume.
 pub(super) fn boxes(mesh: &Mesh, bodies: &[(Part, Body)], target: usize, up: UpAxis) -> Mesh {
     let bounds: Vec<Bounds> =
         bodies.iter().map(|(part, body)| Bounds::of(mesh, part, body, up)).collect();
@@ -43,7 +43,7 @@ pub(super) fn boxes(mesh: &Mesh, bodies: &[(Part, Body)], target: usize, up: UpA
         let larger = (area / (sides.x * sides.y)).sqrt();
         let half = sides * larger * 0.5;
         let across = along.perp();
-        // Moved to where it does not go beyond the bodies, or as much on one side as on the other.
+        // It moves to where it does not go beyond the bodies, or as much on one side as on the other.
         let reach = along.abs() * half.x + across.abs() * half.y;
         let (up_by, down_by) = (low - (middle - reach), high - (middle + reach));
         let middle = middle + up_by.max(DVec2::ZERO) + down_by.min(DVec2::ZERO);
@@ -87,13 +87,13 @@ impl Bounds {
         let middle = (first + last) * 0.5;
         let middle = along * middle.x + along.perp() * middle.y;
         let [low, high] = around([DVec2::X, DVec2::Y]);
-        // What has no extent gets that of a square of its footprint.
+        // A body without an extent gets a thousandth of the side of a square with its footprint.
         let least = body.footprint.sqrt() * 1e-3;
         Self { middle, along, sides: (last - first).max(DVec2::splat(least)), low, high }
     }
 }
 
-/// The body that stays of some: one of the large, which one is left to chance.
+/// Returns the body that stays of some: one of the large, chosen at random.
 fn chosen(bodies: &[usize], number: u64, footprint: impl Fn(usize) -> f64) -> usize {
     let most = bodies.iter().map(|&body| footprint(body)).fold(0.0, f64::max);
     let large: Vec<usize> =
@@ -131,7 +131,7 @@ mod tests {
     use crate::builder::constants::PrismConstants;
     use crate::builder::simplify::aggregate::{ComponentRules, Components};
 
-    /// Boxes of these sides and heights, 30 m apart on a grid, and turned a little.
+    /// Makes boxes of this width, 30 m apart on a grid, each turned by another angle.
     fn houses(count: usize, size: f64) -> Mesh {
         let mut mesh = Mesh::default();
         for house in 0..count * count {
@@ -164,7 +164,7 @@ mod tests {
         components.spread(mesh, target, UpAxis::Z).expect("there are bodies").prisms
     }
 
-    /// Square metres of what faces the sky.
+    /// Returns the area that faces the sky, as seen from above, square metres.
     fn ground(mesh: &Mesh) -> f64 {
         let rise = |&triangle: &[u32; 3]| {
             let [a, b, c] = mesh.corners(triangle);

@@ -6,8 +6,8 @@
 //! height, over their footprint, as high as their roofs are on average, always what changes least of
 //! what is seen from above and from the sides.
 //!
-//! Where they stand too far apart for that, few of them stay as they are, and a coarse node that has to show
-//! most of them is as heavy as its children. Then there are fewer and larger [`boxes`].
+//! Bodies that stand too far apart for that cannot be joined, and a coarse node that has to keep most of them has
+//! as many triangles as its children. There, fewer and larger [`boxes`] can stand for them.
 //!
 //! Those that go on beyond a border, and what is no body (the ground, roads, fences) stay as they
 //! are.
@@ -114,7 +114,7 @@ impl Components {
         Self { bodies, rest, share: in_bodies / area, footprints: OnceCell::new() }
     }
 
-    /// How many bodies there are.
+    /// Returns the number of bodies.
     pub fn count(&self) -> usize {
         self.bodies.len()
     }
@@ -144,15 +144,15 @@ impl Components {
         Some(Extruded { prisms, rest })
     }
 
-    /// The same with fewer and larger boxes ([`boxes`]), which do not stand where the bodies do; `None` where
-    /// there are no bodies.
+    /// Replaces all of them by fewer and larger boxes ([`boxes`]), which do not stand where the bodies do; `None`
+    /// where there are no bodies.
     pub fn spread(&self, mesh: &Mesh, target: usize, up: UpAxis) -> Option<Extruded<'_>> {
         let Self { bodies, rest, .. } = self;
         let boxes = || boxes::boxes(mesh, bodies, self.share_of(target), up);
         (!bodies.is_empty()).then(|| Extruded { prisms: boxes(), rest })
     }
 
-    /// Of so many triangles, those for bodies: they get what the rest does not need.
+    /// Returns how many of `target` triangles bodies get: those that the rest does not need.
     fn share_of(&self, target: usize) -> usize {
         let target = target as f64;
         let for_bodies = (target * self.share).max(target - self.rest.len() as f64);

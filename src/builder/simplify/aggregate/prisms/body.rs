@@ -12,7 +12,7 @@ pub(in super::super) struct Body {
     pub footprint: f64,
     /// The height of its lowest point, metres.
     pub low: f64,
-    /// By how much its roofs are above that on average, metres.
+    /// The mean height of its roofs above that, metres.
     pub height: f64,
     pub roof: Appearance,
     pub wall: Appearance,
