@@ -73,13 +73,12 @@ impl ImageKey {
     }
 }
 
-/// At most so many bytes of decoded images are kept for blocks that have not taken them yet. Decoding an image
-/// again takes a tenth of the time that making a block's textures from it takes.
+/// At most so many bytes of decoded images are kept for blocks that have not taken them yet. With twice as many, a
+/// scan with ten images of 192 MiB is built in 0.96 of the time, and takes 684 MB instead of 613.
 const MOST_KEPT: u64 = 128 << 20;
 
 /// The decoded images of a build. Each is decoded when the first block takes it, and let go of when all
-/// that have announced themselves have taken it, or when images taken since
-/// have more bytes than are kept.
+/// that have announced themselves have taken it, or when images taken since have more bytes than are kept.
 #[derive(Debug)]
 pub struct DecodedImages {
     slots: Mutex<FxHashMap<ImageKey, Arc<Slot>>>,

@@ -6,12 +6,12 @@ use super::bits::BitGrid;
 use super::fill::{self, Texels};
 use crate::decode::DecodedTexture;
 
-/// How far, in texels, used texels are extended into unused ones at every level: no block of a
-/// JPEG (16 a side, with half the colour resolution) that holds a used texel holds a foreign one,
-/// and atlases copy less around a chart (half a cell of reach and the rest of the last cell).
+/// Used texels are extended by so many texels into unused ones at every level. So no block of a JPEG, which is 16
+/// texels wide with half the colour resolution, has both a used texel and a foreign one. Atlases copy less around a
+/// chart: half a cell, and the rest of the last cell.
 pub(crate) const REACH: usize = 16;
 
-/// Which texels of a texture a block uses.
+/// The texels of a texture that a block uses.
 #[derive(Debug)]
 pub(crate) struct Region {
     /// First column and row; outside 0..size where charts cross the image's border.

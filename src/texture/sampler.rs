@@ -219,8 +219,7 @@ mod tests {
         let source = image(120, 80, 3);
         let mut used = BitGrid::new(120, 80);
         (30..50).for_each(|y| used.set_span(y, 40, 70));
-        let tiles = Tiles::around(&used, 2, 3).expect("little is used");
-        let mut tiles = tiles;
+        let mut tiles = Tiles::around(&used, 2, 3).expect("little is used");
         source.pixels.chunks_exact(360).enumerate().for_each(|(y, row)| tiles.write_row(y, row));
         tiles.finish();
         let rows = Sampler::of_rows(&source.pixels, [120, 80], 3, 360);

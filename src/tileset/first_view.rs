@@ -87,15 +87,10 @@ fn eye(root: &Seen) -> DVec3 {
 
 /// Returns the error of a tile in pixels.
 fn pixels(tile: &Seen, eye: DVec3) -> f64 {
-    let from = tile.to_whole.inverse().transform_point3(eye) - tile.volume.centre;
-    let along = |half: DVec3| {
-        let axis = half.normalize_or_zero();
-        axis * from.dot(axis).clamp(-half.length(), half.length())
-    };
-    let outside = (from - tile.volume.half.into_iter().map(along).sum::<DVec3>()).length();
+    let distance = tile.volume.distance(tile.to_whole.inverse().transform_point3(eye));
     // At a distance of 1, half of the rows cover the tangent of 30 degrees.
-    let rows = ROWS * 0.5 / (1.0 / 3.0f64.sqrt());
-    tile.error * rows / outside.max(f64::MIN_POSITIVE)
+    let rows = ROWS * 0.5 * 3.0f64.sqrt();
+    tile.error * rows / distance.max(f64::MIN_POSITIVE)
 }
 
 /// Returns the number of primitives of a GLB, and the images beside it; none if it cannot be read.

@@ -37,6 +37,16 @@ impl Volume {
         })
     }
 
+    /// Returns the distance of a point from it, metres; 0 inside.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        let from = point - self.centre;
+        let nearest = |half: DVec3| {
+            let axis = half.normalize_or_zero();
+            axis * from.dot(axis).clamp(-half.length(), half.length())
+        };
+        (from - self.half.into_iter().map(nearest).sum::<DVec3>()).length()
+    }
+
     /// How far a point is outside of it, metres.
     pub fn outside(&self, point: DVec3) -> f64 {
         let from = point - self.centre;

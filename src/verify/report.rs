@@ -30,7 +30,7 @@ pub struct VerifyReport {
     pub passed: bool,
     /// Facts of the scene; `None` where it could not be read.
     pub scene: Option<SceneFacts>,
-    /// What a viewer needs for the first picture of the whole; `None` where the scene could not be read.
+    /// The requests, bytes and draw calls of the first picture of the whole; `None` if the scene could not be read.
     pub first_view: Option<FirstView>,
     /// All checks, in the order in which they were made.
     pub checks: Vec<Check>,

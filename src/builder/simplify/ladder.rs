@@ -307,8 +307,11 @@ fn clustered(mesh: &Mesh, border: &Border, locked: &[bool], target: usize) -> Si
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec2;
+
     use super::*;
     use crate::builder::constants::MeasureConstants;
+    use crate::builder::simplify::test_box::add_box;
 
     #[test]
     fn a_budget_is_no_reason_to_leave_out_whole_sides() {
@@ -330,19 +333,10 @@ mod tests {
     fn houses(count: u16) -> Mesh {
         let mut mesh = Mesh::default();
         for house in 0..count {
-            let (x, y) = (f32::from(house % 20) * 14.0, f32::from(house / 20) * 18.0);
-            let first = mesh.positions.len() as u32;
-            for z in [0.0, 6.0] {
-                let corners = [[0.0, 0.0], [8.0, 0.0], [8.0, 11.0], [0.0, 11.0]];
-                mesh.positions.extend(corners.map(|[i, j]| [x + i, y + j, z]));
-            }
-            let mut triangles = vec![[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]];
-            for (i, j) in [(0, 1), (1, 2), (2, 3), (3, 0)] {
-                triangles.extend([[i, j, j + 4], [i, j + 4, i + 4]]);
-            }
-            mesh.triangles.extend(triangles.iter().map(|t| t.map(|vertex| first + vertex)));
+            let (x, y) = (f64::from(house % 20) * 14.0, f64::from(house / 20) * 18.0);
+            let corners = [[0.0, 0.0], [8.0, 0.0], [8.0, 11.0], [0.0, 11.0]];
+            add_box(&mut mesh, corners.map(|[i, j]| DVec2::new(x + i, y + j)), 6.0);
         }
-        mesh.materials = vec![0; mesh.positions.len()];
         mesh
     }
 

@@ -18,6 +18,8 @@ pub mod orient;
 mod parts;
 pub mod simplified;
 pub mod split_mixed;
+#[cfg(test)]
+mod test_box;
 pub mod weld_seams;
 
 pub use self::aggregate::{ComponentRules, Extrudable};

@@ -130,6 +130,7 @@ mod tests {
     use super::*;
     use crate::builder::constants::PrismConstants;
     use crate::builder::simplify::aggregate::{ComponentRules, Components};
+    use crate::builder::simplify::test_box::add_box;
 
     /// Makes boxes of this width, 30 m apart on a grid, each turned by another angle.
     fn houses(count: usize, size: f64) -> Mesh {
@@ -139,20 +140,10 @@ mod tests {
             let along = DVec2::from_angle(house as f64 * 0.1);
             let half = DVec2::new(size, 0.7 * size) * 0.5;
             let height = 4.0 + (house % 5) as f64;
-            let first = mesh.positions.len() as u32;
-            for z in [0.0, height] {
-                for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
-                    let at = middle + along * (half.x * x) + along.perp() * (half.y * y);
-                    mesh.positions.push(at.extend(z).as_vec3().to_array());
-                }
-            }
-            let mut triangles = vec![[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]];
-            for (i, j) in [(0, 1), (1, 2), (2, 3), (3, 0)] {
-                triangles.extend([[i, j, j + 4], [i, j + 4, i + 4]]);
-            }
-            mesh.triangles.extend(triangles.iter().map(|t| t.map(|vertex| first + vertex)));
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .map(|(x, y)| middle + along * (half.x * x) + along.perp() * (half.y * y));
+            add_box(&mut mesh, corners, height);
         }
-        mesh.materials = vec![0; mesh.positions.len()];
         mesh
     }
 

@@ -80,9 +80,6 @@ fn are_many(bodies: usize, target: usize, rules: &ComponentRules) -> bool {
     bodies * rules.constants.triangles_per_body > target
 }
 
-/// Prisms are made of so many triangles at least: those of a box, without its floor.
-const LEAST_TRIANGLES: usize = 10;
-
 /// The bodies of a mesh, which prisms may stand for.
 pub struct Components {
     bodies: Vec<(Part, Body)>,
@@ -156,7 +153,7 @@ impl Components {
     fn share_of(&self, target: usize) -> usize {
         let target = target as f64;
         let for_bodies = (target * self.share).max(target - self.rest.len() as f64);
-        (for_bodies as usize).max(LEAST_TRIANGLES)
+        (for_bodies as usize).max(boxes::TRIANGLES)
     }
 }
 
